@@ -97,23 +97,10 @@ class LawSettings(Settings):
 @slot
 @returns('state after the tick', 'roll moment (N m)', 'pitch moment (N m)')
 def law_step(state, seen, params, dt):
-    """One tick of a control law, by the type of its params.
+    """One tick of a control law, of ``dt`` s, by the type of its params (`LawSettings.params`).
 
-    Parameters
-    ----------
-    state : NamedTuple
-        Of the law; the surface and a refused odometry leave it as it is.
-    seen : Seen
-    params : NamedTuple
-        Those of `LawSettings.params`.
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    state : NamedTuple
-    tau_p, tau_q : float
-        Roll and pitch moment wanted of the moving mass (N m).
+    Of a `Seen` it makes the moments that are wanted of the moving mass. At the surface, and where
+    odometry is lost, it is not asked.
     """
 
 

@@ -15,18 +15,10 @@ from glider_control.law import LawSettings, law_step
 
 
 def own_law(law: type[LawSettings] | Callable) -> type[LawSettings]:
-    """Settings of a law, from a class of them, or from a function that is the law.
+    """Settings of a law: a subclass of `LawSettings`, or of a function that is the law.
 
-    Parameters
-    ----------
-    law : type or callable
-        A subclass of `LawSettings`; or a function of a `Seen` that returns the roll and the pitch
-        moment (N m), of which numba compiles the body.
-
-    Raises
-    ------
-    ConfigurationError
-        If it is neither.
+    Of a `Seen` it returns the roll and the pitch moment (N m); numba compiles its body. Raises
+    ConfigurationError if it is neither.
     """
     if isinstance(law, type) and issubclass(law, LawSettings):
         return law

@@ -40,24 +40,11 @@ class NoSteering(NamedTuple):
 
 @slot
 def steer(state, seen, params, dt):
-    """One tick of steering by a surface, by the type of its params.
+    """One tick of steering by a surface, of ``dt`` s, by the type of `SurfaceLawSettings.params`.
 
-    Parameters
-    ----------
-    state : NamedTuple
-        Of the steering; the surface of the sea and a refused odometry leave it as it is.
-    seen : Seen
-        As a control law sees it.
-    params : NamedTuple
-        Those of `SurfaceLawSettings.params`.
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    state : NamedTuple
-    delta : float
-        Angle of the surface (rad), + turns the nose to starboard; control holds it in its range.
+    Of a `Seen`, as a control law has it, comes the state after the tick, and the angle of the
+    surface (rad), + turns the nose to starboard, which control holds in its range. At the surface
+    of the sea, and where odometry is lost, it is not asked.
     """
 
 
@@ -73,17 +60,7 @@ def _bank_to_turn(state, seen, params, dt):
 def surface_learnt(learnt, state, params):
     """What is told on the topic ``adaptation``, with what steering has learnt of its surface.
 
-    Parameters
-    ----------
-    learnt : Adaptation
-        What the control law has learnt.
-    state : NamedTuple
-        Of the steering.
-    params : NamedTuple
-        Those of `SurfaceLawSettings.params`, by whose type it is.
-
-    Returns
-    -------
-    Adaptation
+    Both it and ``learnt``, what the control law has learnt, are an `Adaptation`. ``state`` is that
+    of the steering; by the type of `SurfaceLawSettings.params`.
     """
     return learnt

@@ -87,22 +87,10 @@ def of_one_flight(
     """Files that are of the flight that most of them are of, and a sentence for each other one.
 
     Not those of another vehicle, far off in time, or of a time at which the vehicle wrote another
-    file.
-
-    Parameters
-    ----------
-    place : Path
-    files : list
-        What they say, in the order in which the vehicle wrote them: each has a ``name``, its
-        ``vehicle``, '' if it does not say, and the times of its samples, ``time_s`` (s since
-        1970), NaN or not.
-    left_out : dict
-        Why some are left out already, by name.
-
-    Raises
-    ------
-    ConfigurationError
-        If no vehicle has more files than each of the others, or none is left.
+    file. What they say is in the order in which the vehicle wrote them: each has a ``name``, its
+    ``vehicle``, '' if it does not say, and the times of its samples, ``time_s`` (s since 1970),
+    NaN or not. ``left_out`` says why some are left out already, by name. Raises ConfigurationError
+    if no vehicle has more files than each of the others, or none is left.
     """
     left_out = left_out | _strangers(place, files)
     notes = said(left_out)

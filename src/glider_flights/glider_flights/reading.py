@@ -29,19 +29,10 @@ def files_by_kind(place: Path) -> dict[str, list[Path]]:
 
 
 def read_flight(place: Path, cache: Path | None, progress: Progress) -> Flight:
-    """Read a flight with at least one segment.
+    """Read a flight with at least one segment, from a folder or one file.
 
-    Parameters
-    ----------
-    place : Path
-        Folder, or one file.
-    cache : Path or None
-        Folder of a Slocum's caches; without it they are looked for.
-    progress : Progress
-
-    Raises
-    ------
-    ConfigurationError
+    Without a ``cache``, the folder of a Slocum's caches, they are looked for. Raises
+    ConfigurationError.
     """
     flight = _nose_up(place, _read(place, cache, progress, read_slocum, read_seaglider, read_og1))
     if not flight.segments:

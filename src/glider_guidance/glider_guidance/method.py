@@ -107,20 +107,7 @@ class Asked(NamedTuple):
 @slot
 @returns('state after the tick', 'Asked')
 def method_step(state, seen, params, dt):
-    """One tick of a guidance method, by the type of its params.
+    """One tick of a guidance method, of ``dt`` s, by the type of its params.
 
-    Parameters
-    ----------
-    state : NamedTuple
-        Of the method.
-    seen : Situation
-    params : NamedTuple
-        Those of `MethodSettings.params`.
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    NamedTuple, Asked
-        Its state after the tick, and what it asks for.
+    They are those of `MethodSettings.params`; what it has ``seen`` is a `Situation`.
     """

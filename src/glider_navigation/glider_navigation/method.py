@@ -94,20 +94,7 @@ NONE = Covariance(0.0, 0.0, 0.0)
 @slot
 @returns('state after the tick', 'Believed')
 def method_step(state, heard, params, dt):
-    """One tick of a navigation method, by the type of its params.
+    """One tick of a navigation method, of ``dt`` s, by the type of its params.
 
-    Parameters
-    ----------
-    state : NamedTuple
-        Of the method.
-    heard : Heard
-    params : NamedTuple
-        Those of `NavigationMethodSettings.params`.
-    dt : float
-        Length of the tick (s).
-
-    Returns
-    -------
-    NamedTuple, Believed
-        Its state after the tick, and what it believes.
+    They are those of `NavigationMethodSettings.params`; what it has ``heard`` is a `Heard`.
     """

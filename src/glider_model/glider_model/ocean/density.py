@@ -66,21 +66,10 @@ class Immersed(NamedTuple):
 
 @slot
 def immersed(depth, m_b, vehicle, params):
-    """What a vehicle weighs at a depth, by the type of the water's params.
+    """What a vehicle (`VehicleParams`) weighs at a depth (m), by the type of the water's params.
 
-    Parameters
-    ----------
-    depth : float
-        (m), above the surface as at it.
-    m_b : float
-        Net heaviness by the buoyancy engine in water of `SEA_WATER_DENSITY` (kg, + sinks).
-    vehicle : VehicleParams
-    params : NamedTuple
-        Of the water.
-
-    Returns
-    -------
-    Immersed
+    It is `Immersed`; above the surface as at it. ``m_b`` is the net heaviness by the buoyancy
+    engine in water of `SEA_WATER_DENSITY` (kg, + sinks).
     """
 
 

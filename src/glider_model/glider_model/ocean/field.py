@@ -61,21 +61,10 @@ class NoField(NamedTuple):
 @slot
 @returns('to the north', 'to the east', 'down (m/s)')
 def field_velocity(position, t_s, params):
-    """Velocity of the water at a place and time, by the type of the params.
+    """Velocity of the water at a place and time (s since the start), by the type of the params.
 
-    Parameters
-    ----------
-    position : tuple of 3 float
-        North, east and depth (m). Depth is that of the place, never above the surface.
-    t_s : float
-        Time since the start (s).
-    params : NamedTuple
-        Those of `FieldSettings.params`.
-
-    Returns
-    -------
-    v_n, v_e, v_d : float
-        To the north, to the east and down (m/s).
+    The position is north, east and depth (m) of the place, never above the surface; the params are
+    those of `FieldSettings.params`.
     """
 
 

@@ -379,21 +379,10 @@ def load(
     needed: Window | None = None,
     wanted: tuple[Wanted, ...] = VELOCITIES,
 ) -> Loaded:
-    """Read a window of a file; all of it without one.
+    """Read what is wanted of a file in a window, as far as the file has it; all of it without one.
 
-    Parameters
-    ----------
-    path : Path
-    window : Window, optional
-        That is read, as far as the file has it.
-    needed : Window, optional
-        That the file has to cover.
-    wanted : tuple of Wanted
-
-    Raises
-    ------
-    ValueError
-        Naming the file, and what is missing in it or what of the window it does not cover.
+    A ConfigurationError names the file, and what is missing in it or what of the window that is
+    ``needed`` it does not cover.
     """
     with _opened(path) as dataset:
         layout = _layout(dataset, wanted)

@@ -35,25 +35,11 @@ class NoSurface(NamedTuple):
 
 @slot
 def surface_loads(loads, u, v, w, p, q, r, delta, params):
-    """Loads of the water on the hull and on a steering surface, by the type of its params.
+    """Loads on hull and steering surface, by the type of its params (`SurfaceSettings.params`).
 
-    Parameters
-    ----------
-    loads : tuple of float
-        Viscous force (N) and moment (N m) on the hull about the origin, in FRD; 6 numbers.
-    u, v, w : float
-        Velocity through the water (m/s), FRD.
-    p, q, r : float
-        Angular rates (rad/s).
-    delta : float
-        Angle of the surface (rad), + turns the nose to starboard.
-    params : NamedTuple
-        Those of `SurfaceSettings.params`.
-
-    Returns
-    -------
-    tuple of float
-        The loads with those on the surface added; 6 numbers.
+    Those on the surface are added to ``loads``: viscous force (N) and moment (N m) on the hull
+    about the origin, FRD, 6 numbers. u, v, w are the velocity through the water (m/s), p, q, r the
+    angular rates (rad/s), FRD; ``delta`` is the angle (rad), + turns the nose to starboard.
     """
 
 
