@@ -145,7 +145,8 @@ class Floor:
 
     def __init__(self, state, params) -> None:
         self._structs = Structs()
-        for value in (state, params, motion.Rates(0.0, 0.0, 0.0)):
+        numbers = motion.Rates, rigid_body.Inertia, exponential.Decay
+        for value in (state, params, *(one(*len(one._fields) * (0.0,)) for one in numbers)):
             self._structs.declare(value)
         with TemporaryDirectory() as folder:
             library = Path(folder) / 'floor.so'

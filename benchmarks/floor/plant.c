@@ -85,12 +85,6 @@ static inline Joints actuators_step(
 
 /* ------------------------------------------------------------------------------ rigid body */
 
-typedef struct {
-    double s_x, s_y, s_z;
-    double i_xx, i_yy, i_zz, i_xy, i_xz, i_yz;
-    double n_xx, n_yy, n_zz, n_xy, n_xz, n_yz;
-} Inertia;
-
 static inline Inertia rigid_body(double x_p, double mu, const VehicleParams *vehicle)
 {
     double x = vehicle->x_p0 + x_p;
@@ -274,7 +268,6 @@ static inline Rates rate_damping(
 
 /* ----------------------------------------------------------------------------- exponential */
 
-typedef struct { double half, half_input, whole, first, middle, last; } Decay;
 typedef struct { double decay, phi_1, phi_2, phi_3; } Phi;
 
 static inline Phi phi_functions(double z)
