@@ -17,6 +17,7 @@ import numpy as np
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S
 from glider_bringup.engines import direct
+from glider_bringup.engines.direct import MissionParams, MissionState
 from glider_bringup.engines.flight import fly, mission_of
 from glider_guard.rows import DROPS, SURFACES
 from glider_mission.blocks import COLUMNS, ROW
@@ -95,14 +96,20 @@ def _rise(plant, params, water, command, mass, mode, drop, depths, dt):
         before = plant.motion.p_d
 
 
+def _flown(scenario: Scenario, for_s: float) -> tuple[MissionState, MissionParams, np.ndarray]:
+    """State, params and log (float64[ticks, ROW]) of a flight of ``for_s`` or less."""
+    state, params = mission_of(scenario)
+    log = np.empty((round(for_s / TICK_S), ROW))
+    state, rows, _ = direct.fly(state, params, log, TICK_S)
+    return state, params, log[:rows]
+
+
 def _all_done(
     scenario: Scenario, from_s: float, for_s: float, drops: bool = True
 ) -> Iterator[np.ndarray]:
     """Depths (m), float64[ticks] from a time on, if all is done then: of each mode, as asked."""
-    state, params = mission_of(scenario)
-    log = np.empty((max(1, round(from_s / TICK_S)), ROW))
-    state, rows, _ = direct.fly(state, params, log, TICK_S)
-    water = tuple(log[rows - 1, COLUMNS['current_velocity']])
+    state, params, log = _flown(scenario, max(from_s, TICK_S))
+    water = tuple(log[-1, COLUMNS['current_velocity']])
     vehicle = params.plant.vehicle
     command, mass = (-vehicle.m_b_max, -vehicle.x_p_max), make_moving_mass(vehicle)
     for mode in range(3):
@@ -117,14 +124,6 @@ def _comes_up(depths: np.ndarray) -> bool:
     return bool(depths[-1] < AT_SURFACE_M or depths[-1] < then - HANGS_M)
 
 
-def _flown(scenario: Scenario, for_s: float) -> np.ndarray:
-    """Log of a flight, float64[ticks, ROW], that ends after a time (s) at the latest."""
-    state, params = mission_of(scenario)
-    log = np.empty((round(for_s / TICK_S), ROW))
-    _, rows, _ = direct.fly(state, params, log, TICK_S)
-    return log[:rows]
-
-
 def _shown_s(scenario: Scenario, until_s: float) -> list[float]:
     """When (s) each fault showed: the first tick at which it changed a bit; inf: not by then.
 
@@ -132,7 +131,7 @@ def _shown_s(scenario: Scenario, until_s: float) -> list[float]:
     same shows.
     """
     flights = [
-        _flown(scenario.model_copy(update={'faults': scenario.faults[:count]}), until_s)
+        _flown(scenario.model_copy(update={'faults': scenario.faults[:count]}), until_s)[-1]
         for count in range(len(scenario.faults) + 1)
     ]
     shown_s = []
