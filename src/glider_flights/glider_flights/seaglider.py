@@ -34,11 +34,6 @@ DIVE_FILE = re.compile(r'p(\d{3})(\d{4}).*\.nc.*', re.IGNORECASE)
 #: What a file must have, of `variables.yaml`; first what is as long as time.
 SAMPLED = ('time', 'pitch_rad', 'heading_rad', 'depth_m')
 NEEDED = (*SAMPLED, 'fix_time', 'fix_latitude', 'fix_longitude')
-#: What more there is for a flight model.
-MEASURED = (
-    *('roll_rad', 'pumped_m3', 'mass_x_m', 'mass_roll_rad', 'temperature_degc', 'salinity'),
-    'own_rate_mps',
-)
 #: Eriksen et al. (2001), doi:10.1109/48.972073: a (1/deg), b (Pa^1/4), c (1/deg^2), s, length (m).
 ERIKSEN = {'a': 0.003836, 'b': 0.010078, 'c': 2.1e-6, 's': -0.25, 'length': 1.8}
 #: At shallower pitch the base station takes a Seaglider for stalled (rad).
@@ -128,7 +123,7 @@ def _samples(found: dict[str, np.ndarray], declination: float) -> Samples:
 
 def _instruments(found: dict[str, np.ndarray], samples: Samples) -> Instruments:
     measured = samples._asdict()
-    for name in MEASURED:
+    for name in set(Instruments._fields).difference(measured):
         # What the CTD measured, and what was made of it, has times of its own.
         for times in ('time', 'ctd_time'):
             if name in found and len(found.get(times, ())) == len(found[name]):

@@ -5,5 +5,3 @@
 #: It has no need of fixes; under water; at the surface without a fix so far; with one.
 KNOWN, UNDER_WATER, AT_SURFACE, FIXED = 0, 1, 2, 3
 PHASE_NAMES = ('position known', 'under water', 'at the surface, no fix yet', 'fixed')
-#: A vehicle that has been below the first depth dives, above the second it has come up (m).
-DIVES_M, SURFACES_M = 3.0, 1.5

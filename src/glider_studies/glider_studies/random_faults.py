@@ -11,14 +11,13 @@ import numpy as np
 import pydantic
 
 from glider_base.files import read_yaml
-from glider_model.plant.faults.settings import SENSED, Fault, FaultSettings
+from glider_model.plant.faults.settings import PHASES, SENSED, Fault, FaultSettings
 
 _FILE = read_yaml(Path(__file__).with_suffix('.yaml'))
 #: Fields of what is drawn, by kind.
 DRAWN: dict[str, dict[str, Any]] = _FILE['kinds']
 #: Shares of them that wait for a phase, and for a depth.
 BY_PHASE, BY_DEPTH = 0.25, 0.25
-_PHASES = ('dive', 'turn', 'climb', 'surface')
 #: Sets the draw apart from that of the plant of the same seed.
 _STREAM = 13
 _FAULT = pydantic.TypeAdapter(Fault)
@@ -70,7 +69,7 @@ def _sample(
     fields['at_s'] = round(draw.uniform(*_FILE['begins']) * duration_s, 1)
     when = draw.random()
     if depth_m and when < BY_PHASE + BY_DEPTH:
-        fields['phase'] = str(draw.choice(_PHASES))
+        fields['phase'] = str(draw.choice(PHASES[1:]))
         if when < BY_DEPTH and fields['phase'] in ('dive', 'climb'):
             fields['at_depth_m'] = round(draw.uniform(0.0, 1.0) * depth_m, 1)
     if draw.random() < 0.5:

@@ -10,7 +10,7 @@ import numpy as np
 from glider_base.frames import Origin, from_geodetic
 from glider_bringup.scoring.scores import largest, rms, seconds
 from glider_mission.blocks import COLUMNS
-from glider_navigation.phase import DIVES_M, SURFACES_M
+from glider_model.onboard.fix_watch import DIVES_M, SURFACES_M
 
 _ODOM, _FIX = (COLUMNS[name].start for name in ('odom', 'fix'))
 _CURRENT, _BELIEVED = (COLUMNS[name].start for name in ('current_velocity', 'believed_current'))

@@ -17,6 +17,7 @@ from glider_base.frames import odometry_to_wire, quaternion_from_euler, rotate_t
 from glider_base.kernel import kernel, replace
 from glider_base.settings import number
 from glider_base.signals import Covariance, Odometry, Vector
+from glider_model.onboard.fix_watch import DIVES_M, SURFACES_M
 from glider_model.onboard.glide_polar import Polar, make_polar
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
 from glider_navigation import current_belief as belief
@@ -38,7 +39,7 @@ from glider_navigation.method import (
     Start,
     method_step,
 )
-from glider_navigation.phase import AT_SURFACE, DIVES_M, FIXED, SURFACES_M, UNDER_WATER
+from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
 from glider_navigation.surface_stay import Stay
 
 #: Shorter than this (s) a way under water tells no current.
