@@ -69,14 +69,6 @@ class Turn(NamedTuple):
     turned: float  #: heading since the sample (rad)
 
 
-def make_turn(vehicle: Vehicle) -> Turn:
-    """What the vehicle's file says of its steering."""
-    dive, climb = (
-        Turning(k, max(k * k, LEAST_K_STD * LEAST_K_STD)) for k in vehicle.steering_rates
-    )
-    return Turn(dive, climb, 0.0, 0.0, 0.0)
-
-
 _LEVEL = Angles(0.0, 0.0, 0.0)
 
 
@@ -94,8 +86,11 @@ class AttitudeState(NamedTuple):
 
 
 def initial_attitude(vehicle: Vehicle) -> AttitudeState:
-    """Nothing is measured yet."""
-    return AttitudeState(make_turn(vehicle))
+    """Nothing is measured yet: it steers as the vehicle's file says."""
+    dive, climb = (
+        Turning(k, max(k * k, LEAST_K_STD * LEAST_K_STD)) for k in vehicle.steering_rates
+    )
+    return AttitudeState(Turn(dive, climb, 0.0, 0.0, 0.0))
 
 
 class Attitude(NamedTuple):
