@@ -9,8 +9,9 @@ anything worse turns a verdict to ``failed``.
 
 import json
 import math
+import operator
 from collections.abc import Callable, Collection, Hashable, Iterator
-from functools import cache
+from functools import cache, partial
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -275,19 +276,16 @@ def _row(scores: dict[str, Any], failed: bool = False) -> dict[str, Any]:
     return {'finite': whole, **clean, **({'status': 'failed'} if failed else {})}
 
 
-def _work(task: tuple[Callable, Any]) -> Any:
-    function, argument = task
-    return function(argument)
-
-
-def _tasks(experiments: list[Experiment]) -> dict[Hashable, tuple[Callable, Any]]:
+def _tasks(experiments: list[Experiment]) -> dict[Hashable, Callable[[], Any]]:
     """What is to be done; what two experiments share once, with its record if one is drawn."""
     cases: dict[str, Case] = {}
     for case in (case for one in experiments for case in one.cases):
         if case.drawn or case.key() not in cases:
             cases[case.key()] = case
-    return {key: (_fly_case, case) for key, case in cases.items()} | {
-        (one.name, key): (one.fly, task) for one in experiments for key, task in one.tasks.items()
+    return {key: partial(_fly_case, case) for key, case in cases.items()} | {
+        (one.name, key): partial(one.fly, task)
+        for one in experiments
+        for key, task in one.tasks.items()
     }
 
 
@@ -299,7 +297,7 @@ def fly(
     Returns rows by experiment and case; and the record of each case (None for what is not drawn),
     or what else is told of a study.
     """
-    flown = pool.results(_work, _tasks(experiments), progress)
+    flown = pool.results(operator.call, _tasks(experiments), progress)
     found = []
     for one in experiments:
         if one.tasks:
