@@ -130,17 +130,9 @@ def _constants() -> str:
 
 
 class Floor:
-    """The compiled floor.
+    """The compiled floor; its structs are made of the state and the params of any plant.
 
-    Parameters
-    ----------
-    state, params : PlantState, PlantParams
-        Any plant: what it is made of makes the structs.
-
-    Raises
-    ------
-    RuntimeError
-        If the compiler refuses.
+    Raises RuntimeError if the compiler refuses.
     """
 
     def __init__(self, state, params) -> None:

@@ -108,10 +108,5 @@ def law_step(state, seen, params, dt):
 @default
 @returns(*Adaptation._fields)
 def law_learnt(state, params):
-    """What a law has learnt, for the topic ``adaptation``: nothing, if it does not say.
-
-    Returns
-    -------
-    Adaptation
-    """
+    """`Adaptation` of a law, for the topic ``adaptation``: nothing learnt, if it does not say."""
     return NOTHING_LEARNT

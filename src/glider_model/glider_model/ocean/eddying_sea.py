@@ -49,13 +49,8 @@ class EddyingSea(Settings):
 def currents(sea: EddyingSea) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
     """Axes of a sea by name, and its velocities to the east and to the north (m/s).
 
-    With an error they are those of a forecast of the sea.
-
-    Returns
-    -------
-    axes : dict
-        time (hours since the start), depth (m), latitude, longitude (deg).
-    east, north : float64[time, depth, latitude, longitude]
+    Axes are time (hours since the start), depth (m), latitude and longitude (deg), in the order of
+    the velocities' dimensions. With an error they are those of a forecast of the sea.
     """
     rng = np.random.default_rng(sea.seed)
     latitude = np.arange(sea.south_deg, sea.north_deg + 1e-9, _STEP_DEG)

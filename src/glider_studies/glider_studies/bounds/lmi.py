@@ -18,18 +18,9 @@ def solve(
 ) -> np.ndarray | None:
     """Minimise cost' y such that F_0 + sum y_i F_i is positive definite in each block.
 
-    Parameters
-    ----------
-    cost : float64[m]
-    blocks : list of (float64[..., n, n], float64[m, ..., n, n])
-        F_0 and F_i, of one matrix or of a stack of them.
-    start : float64[m]
-        Where the search begins; it need not be feasible.
-
-    Returns
-    -------
-    float64[m] or None
-        None if no feasible point was found.
+    Blocks are F_0 and F_i, float64[..., n, n] and float64[m, ..., n, n]: of one matrix or of a
+    stack of them. The search begins at ``start``, float64[m], which need not be feasible. Returns
+    y, float64[m], or None if no feasible point was found.
     """
     blocks = [
         (

@@ -167,12 +167,9 @@ def _feasible(speed_mps: float, current_kn: np.ndarray, angle_deg: np.ndarray) -
 def shares(stability: StabilityMap) -> list[dict[str, Any]]:
     """Share of the cells of every class, by panel.
 
-    Returns
-    -------
-    list of dict
-        ``panel``, ``cells``, a share for each of `CLASSES`, ``feasible`` (share of the cells in
-        which physics allows to hold the path), ``stable_of_feasible``, None if no cell is, and
-        ``horizontal_kn``, U_h.
+    Of each ``panel`` they are ``cells``, a share for each of `CLASSES`, ``feasible`` (share of the
+    cells in which physics allows to hold the path), ``stable_of_feasible``, None if no cell is,
+    and ``horizontal_kn``, U_h.
     """
     rows = []
     for name, classes, feasible, horizontal_kn in zip(
