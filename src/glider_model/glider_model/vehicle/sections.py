@@ -90,10 +90,7 @@ class HydrodynamicsSettings(Settings):
     quadratic_damping: vector('kg/m', 'force over the square of u, v, w; > 0 damps')
     quadratic_angular_damping: vector('kg m^2', 'moment over the square of p, q, r; > 0 damps')
 
-    @pydantic.model_validator(mode='before')
-    @classmethod
-    def _as_others_write_it(cls, values):
-        return with_coefficients(values)
+    _as_others_write_it = pydantic.model_validator(mode='before')(with_coefficients)
 
     @pydantic.model_validator(mode='after')
     def _has_drag(self):
