@@ -65,13 +65,13 @@ class ControlState(NamedTuple):
     measured: Measured
     law: NamedTuple  #: of the law that was chosen
     steering: NamedTuple  #: by the vehicle's steering surface
-    trim: Trim
-    command: Joints  #: last command
-    intake: IntakeState
-    depth: float  #: filtered as the attitude is (m)
-    rate_error: float  #: of the vertical rate, by the depth (m/s)
-    is_afloat: bool
-    stall_s: float  #: for which it has stalled; less than 0: for so long it is led out of it
+    trim: Trim = Trim(0.0, 0.0)
+    command: Joints = Joints(0.0, 0.0, 0.0, 0.0)  #: last command
+    intake: IntakeState = IntakeState()
+    depth: float = 0.0  #: filtered as the attitude is (m)
+    rate_error: float = 0.0  #: of the vertical rate, by the depth (m/s)
+    is_afloat: bool = True
+    stall_s: float = 0.0  #: for which it has stalled; less than 0: it is led out of it so long
 
 
 class ControlOutput(NamedTuple):

@@ -38,22 +38,12 @@ class IntakeParams(NamedTuple):
 class IntakeState(NamedTuple):
     """The last that was believed."""
 
-    gate: GateState  #: the odometry that serves
-    joints: Joints
-    joints_s: float  #: time since (s)
-    reference: Reference
-    reference_s: float
-    refused_s: float  #: time since something was refused
-
-
-INITIAL_INTAKE = IntakeState(
-    gate=INITIAL_GATE,
-    joints=Joints(0.0, 0.0, 0.0, 0.0),
-    joints_s=0.0,
-    reference=Reference(*(12 * (0.0,))),
-    reference_s=0.0,
-    refused_s=REFUSAL_TOLD_S,
-)
+    gate: GateState = INITIAL_GATE  #: the odometry that serves
+    joints: Joints = Joints(0.0, 0.0, 0.0, 0.0)
+    joints_s: float = 0.0  #: time since (s)
+    reference: Reference = Reference(*(12 * (0.0,)))
+    reference_s: float = 0.0
+    refused_s: float = REFUSAL_TOLD_S  #: time since something was refused
 
 
 @kernel

@@ -14,10 +14,9 @@ from glider_base.signals import Joints
 from glider_control import laws, surfaces
 from glider_control.allocation import make_allocation
 from glider_control.control import ControlParams, ControlState
-from glider_control.intake import INITIAL_INTAKE, IntakeParams
+from glider_control.intake import IntakeParams
 from glider_control.law import HeadingSettings, LawSettings
 from glider_control.surface import NoSteering, SurfaceLawSettings
-from glider_control.vertical_rate import Trim
 from glider_model.onboard.attitude_filter import STILL
 from glider_model.onboard.gate import GateSettings
 from glider_model.onboard.glide_polar import make_polar
@@ -152,13 +151,6 @@ class ControlSettings(ControlLawSettings):
             measured=STILL,
             law=self.chosen.initial_state(),
             steering=surface.initial_state() if surface else NoSteering(),
-            trim=Trim(0.0, 0.0),
-            command=Joints(0.0, 0.0, 0.0, 0.0),
-            intake=INITIAL_INTAKE,
-            depth=0.0,
-            rate_error=0.0,
-            is_afloat=True,
-            stall_s=0.0,
         )
 
 
