@@ -25,7 +25,7 @@ from glider_guard.depth import (
     sinking_rate,
     sound,
 )
-from glider_guard.health import INITIAL_HEALTH, HealthLimits, HealthState, check_health
+from glider_guard.health import HealthLimits, HealthState, check_health
 from glider_guard.rows import row
 from glider_guard.weight import (
     INITIAL_WEIGHT,
@@ -50,7 +50,7 @@ from glider_guard.witness import (
     is_out,
     watch,
 )
-from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, FixWatch, contradictions, watch_fixes
+from glider_model.onboard.fix_watch import FixWatch, contradictions, watch_fixes
 from glider_model.onboard.gate import (
     INITIAL_GATE,
     GateParams,
@@ -114,10 +114,10 @@ class GuardState(NamedTuple):
     followers: Followers = INITIAL_FOLLOWERS
     witness: Witness = INITIAL_WITNESS
     depths: Depths = INITIAL_DEPTHS
-    health: HealthState = INITIAL_HEALTH
+    health: HealthState = HealthState()
     weight: Weight = INITIAL_WEIGHT
     ascent: Ascent = INITIAL_ASCENT
-    fixes: FixWatch = INITIAL_FIX_WATCH
+    fixes: FixWatch = FixWatch()
     command: Joints = _REST  #: the last one
     told: int = 0  #: rows
 

@@ -22,12 +22,9 @@ class HealthLimits(NamedTuple):
 class HealthState(NamedTuple):
     """For how long each has not been well (s)."""
 
-    leak_s: float
-    vacuum_s: float
-    battery_s: float
-
-
-INITIAL_HEALTH = HealthState(0.0, 0.0, 0.0)
+    leak_s: float = 0.0
+    vacuum_s: float = 0.0
+    battery_s: float = 0.0
 
 
 @kernel

@@ -9,14 +9,14 @@ import pytest
 from glider_base.signals import Covariance, Odometry
 from glider_guard import rows
 from glider_guard.guard import fix_rows
-from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, watch_fixes
+from glider_model.onboard.fix_watch import FixWatch, watch_fixes
 
 WAY_S, STAY_S, STD_M = 5000, 600, 100.0
 
 
 def fly(jumps, drifts):
     """Rows after each of some dives, by the jumps at fixes and the drifts between (m/s)."""
-    watch, told, n, e = INITIAL_FIX_WATCH, [], 0.0, 0.0
+    watch, told, n, e = FixWatch(), [], 0.0, 0.0
     for way, (drift_n, drift_e) in enumerate(drifts):
         for second in range(STAY_S):
             if way > 0 and second == 60:
@@ -60,4 +60,4 @@ def test_a_current_that_turns_round_shows_in_the_drift_too():
 def test_what_cannot_be_is_not_watched(odometry):
     x = Odometry(*(13 * (odometry,)))
     known = Covariance(odometry, odometry, odometry)
-    assert watch_fixes(INITIAL_FIX_WATCH, x, known, 0.1) == INITIAL_FIX_WATCH
+    assert watch_fixes(FixWatch(), x, known, 0.1) == FixWatch()

@@ -27,7 +27,6 @@ from glider_guidance.path.curve import (
 )
 from glider_guidance.yo.end_of_path import WayLeft, way_left
 from glider_guidance.yo.machine import (
-    INITIAL_PROFILE,
     ProfileParams,
     ProfileState,
     coming_turn,
@@ -55,7 +54,7 @@ from glider_guidance.yo.stage import (
 from glider_guidance.yo.turns import time_to_turn, turn_lead_s
 from glider_model.onboard.attitude_filter import Measured, measure
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_angle
-from glider_model.onboard.fix_watch import INITIAL_FIX_WATCH, FixWatch, contradictions, watch_fixes
+from glider_model.onboard.fix_watch import FixWatch, contradictions, watch_fixes
 from glider_model.onboard.gate import INITIAL_GATE, GateParams, GateState, gate_step
 from glider_model.onboard.glide_polar import (
     MODEL_VERTICAL_RATE,
@@ -127,14 +126,14 @@ class GuidanceState(NamedTuple):
     followed: Followed
     tick: int = 0
     gate: GateState = INITIAL_GATE  #: the odometry that serves
-    profile: ProfileState = INITIAL_PROFILE
+    profile: ProfileState = ProfileState()
     s: float = 0.0  #: path parameter of the virtual target (m)
     path_id: int = 0  #: of the path that is followed
     water: WaterState = WaterState(ObserverState(0.0, 0.0, 0.0, 0.0), 0.0)
     commanded: Commanded = Commanded(Filtered(0.0, 0.0), Filtered(0.0, 0.0), 0.0)
     infeasible_ticks: int = 0
     progress: Progress = Progress()
-    fixes: FixWatch = INITIAL_FIX_WATCH
+    fixes: FixWatch = FixWatch()
 
 
 class GuidanceOutput(NamedTuple):

@@ -13,11 +13,11 @@ from glider_base.signals import TICK_S
 from glider_base.wiring import NO_ECHO
 from glider_guidance.yo.end_of_path import WayLeft, lower_turn, next_dive
 from glider_guidance.yo.machine import (
-    INITIAL_PROFILE,
     NEAR_TICKS,
     NO_END,
     PITCH_OVER,
     ProfileSettings,
+    ProfileState,
     look_ahead_s,
     mission_time_s,
     profile_step,
@@ -60,7 +60,7 @@ class Point:
         self.settings = ProfileSettings(**fields)
         self.params = self.settings.params(dives, pump, POLAR)
         self.pump = pump
-        self.state = INITIAL_PROFILE
+        self.state = ProfileState()
         self.depth, self.rate = 0.0, 0.0
         self.net = -self.settings.net_heaviness_kg
         self.stages, self.depths = [self.state.stage], [0.0]
@@ -233,7 +233,7 @@ def test_preparation_lasts_as_long_as_asked():
 def test_abort_leads_to_surfacing_from_every_stage(stage):
     params = ProfileSettings().params(1, PUMP, POLAR)
     state = profile_step(
-        INITIAL_PROFILE._replace(stage=stage, ticks=100, aborted=True),
+        ProfileState(stage=stage, ticks=100, aborted=True),
         *(200.0, 0.2, NO_ECHO, NO_END, params),
     )
     assert state.stage == SURFACING
@@ -242,7 +242,7 @@ def test_abort_leads_to_surfacing_from_every_stage(stage):
 @pytest.mark.parametrize('stage', ALL_STAGES)
 def test_abort_at_the_surface_stays_there(stage):
     params = ProfileSettings(wait_s=0.0, prepare_s=0.0).params(5, PUMP, POLAR)
-    state = INITIAL_PROFILE._replace(stage=stage, ticks=10**6, aborted=True)
+    state = ProfileState(stage=stage, ticks=10**6, aborted=True)
     for _ in range(100):
         state = profile_step(state, 0.2, 0.0, NO_ECHO, NO_END, params)
     assert state.stage == WAITING_ON_SURFACE
@@ -350,7 +350,7 @@ def test_the_last_dives_take_up_the_way_that_is_left(top, share, is_up, above, l
 def test_the_last_of_so_many_dives_is_left_out_where_the_path_ends_before_it():
     """Two of three are done once the vehicle is up: there is one to come, but no way for it."""
     params = ProfileSettings(depth_m=200.0, top_depth_m=5.0).params(3, PUMP, POLAR)
-    state = INITIAL_PROFILE._replace(stage=GLIDING_UP, dives=1, turn_depth=200.0, depth=200.0)
+    state = ProfileState(stage=GLIDING_UP, dives=1, turn_depth=200.0, depth=200.0)
     moved = profile_step(state, 100.0, -0.2, NO_ECHO, WayLeft(10.0, 0.0), params)
     assert moved.turn_depth == 0.0
 
@@ -359,7 +359,7 @@ def test_the_last_of_so_many_dives_is_left_out_where_the_path_ends_before_it():
 def test_the_first_turn_of_a_vehicle_that_sinks_too_fast_is_led_by_more(known):
     """By the square of how much faster it is; one that has turned knows how long that takes."""
     params = ProfileSettings(depth_m=200.0).params(0, PUMP, POLAR)
-    state = INITIAL_PROFILE._replace(stage=GLIDING_DOWN, turn_depth=200.0, depth=200.0, **known)
+    state = ProfileState(stage=GLIDING_DOWN, turn_depth=200.0, depth=200.0, **known)
     rate = 1.4 * params.dive_rate
     lead_s = 1.0 if known else params.lead_s
     lead = rate * lead_s * (1.0 if known else 1.4**2)
@@ -380,7 +380,7 @@ def test_a_dive_turns_where_the_rest_of_the_path_takes_it_up(depth, turn, lead_s
 def test_a_bottom_that_is_near_for_three_seconds_turns_a_dive():
     """Not one that is heard too near for less, by whatever swims there."""
     params = ProfileSettings(depth_m=200.0, clearance_m=10.0).params(0, PUMP, POLAR)
-    state = INITIAL_PROFILE._replace(stage=GLIDING_DOWN, turn_depth=200.0, depth=200.0)
+    state = ProfileState(stage=GLIDING_DOWN, turn_depth=200.0, depth=200.0)
     for _ in range(NEAR_TICKS):
         state = profile_step(state, 100.0, 0.2, 5.0, NO_END, params)
         assert state.stage == GLIDING_DOWN
@@ -392,6 +392,6 @@ def test_a_bottom_that_is_near_for_three_seconds_turns_a_dive():
 def test_a_dive_that_has_not_begun_to_sink_does_not_turn(depth, rate):
     """A start under water rises as yet; at the surface a noisy rate is no way down."""
     params = ProfileSettings(depth_m=36.0).params(0, PUMP, POLAR)
-    state = INITIAL_PROFILE._replace(stage=GLIDING_DOWN, turn_depth=36.0, depth=36.0)
+    state = ProfileState(stage=GLIDING_DOWN, turn_depth=36.0, depth=36.0)
     assert profile_step(state, depth, rate, NO_ECHO, NO_END, params).stage == GLIDING_DOWN
     assert profile_step(state, 23.0, 0.3, NO_ECHO, NO_END, params).stage == INFLECTING_UP

@@ -57,9 +57,6 @@ class IntakeState(NamedTuple):
     refused_s: float = REFUSAL_TOLD_S  #: since something was refused
 
 
-INITIAL_INTAKE = IntakeState()
-
-
 @kernel
 def _is_plausible(imu, params):
     """Whether a sample is an attitude, with rates that a glider can have; false for NaN."""

@@ -16,7 +16,7 @@ from glider_model.vehicle.actuators import ranges
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation import methods
 from glider_navigation.forecast import ForecastSettings
-from glider_navigation.intake import INITIAL_INTAKE, IntakeParams, IntakeState
+from glider_navigation.intake import IntakeParams, IntakeState
 from glider_navigation.method import NavigationMethodSettings, Start
 
 #: Other parameters of navigation: no method can have such a name.
@@ -133,7 +133,7 @@ class NavigationSettings(NavigationLawSettings):
 
     def initial_state(self) -> 'NavigationState':
         """State before the first tick."""
-        return NavigationState(INITIAL_INTAKE, self.chosen.initial_state(self._start))
+        return NavigationState(IntakeState(), self.chosen.initial_state(self._start))
 
 
 class NavigationParams(NamedTuple):

@@ -158,17 +158,13 @@ class ProfileState(NamedTuple):
     near_ticks: int = 0  #: for which the bottom has been heard too near for this dive
     dives: int = 0  #: dives completed
     aborted: bool = False
-    lead_up_s: float = (
-        0.0  #: lead of the turn at depth, as learnt from the last one; 0: none yet (s)
-    )
+    lead_up_s: float = 0.0  #: lead of the turn at depth, as learnt from the last; 0: none yet (s)
     lead_down_s: float = 0.0  #: lead of the upper turn
-    turn_depth: float = (
-        math.inf
-    )  #: planned lower turn of this dive, or of the next; 0: none is to come (m)
+    #: Planned lower turn of this dive, or of the next; 0: none is to come (m).
+    turn_depth: float = math.inf
     depth: float = math.inf  #: of a dive, when that was planned (m)
 
 
-INITIAL_PROFILE = ProfileState()
 #: Of a mission that does not end with its path.
 NO_END = WayLeft(math.inf, 0.0)
 

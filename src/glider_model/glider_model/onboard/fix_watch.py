@@ -52,9 +52,6 @@ class FixWatch(NamedTuple):
     against: int = 0  #: those of the last six that contradict, as bits
 
 
-INITIAL_FIX_WATCH = FixWatch()
-
-
 @kernel
 def contradictions(watch):
     """Number of the last six surfacings whose fixes contradict."""
