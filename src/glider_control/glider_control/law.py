@@ -99,8 +99,8 @@ class LawSettings(Settings):
 def law_step(state, seen, params, dt):
     """One tick of a control law, of ``dt`` s, by the type of its params (`LawSettings.params`).
 
-    Of a `Seen` it makes the moments that are wanted of the moving mass. At the surface, and where
-    odometry is lost, it is not asked.
+    Of a `Seen` come its state after the tick, and the roll and the pitch moment (N m) that are
+    wanted of the moving mass. At the surface, and where odometry is lost, it is not asked.
     """
 
 
