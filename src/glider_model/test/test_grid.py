@@ -255,6 +255,17 @@ def test_what_the_file_does_not_cover_is_refused(places, more, text, tmp_path):
         grid(path, *places, **more)
 
 
+@pytest.mark.parametrize('begin', ['2026-03-01T12:00', ''])
+def test_days_that_are_missing_in_a_file_are_refused_within_a_mission_alone(begin, tmp_path):
+    data = dataset()
+    days = TIMES + np.array([0, 0, 72, 72]) * np.timedelta64(1, 'h')
+    path = written(data.assign_coords(time=data.time.copy(data=days)), tmp_path / 'sea.nc')
+    with pytest.raises(ValueError, match='no water between 2026-03-02T12:00Z and 2026-03-06T1'):
+        grid(path, (36.0, 122.0), begin=begin)
+    grid(path, (36.0, 122.0), begin=begin, lasts_s=86400.0)
+    grid(path, (36.0, 122.0), begin='2026-03-06T12:00', lasts_s=86400.0)
+
+
 @pytest.mark.parametrize('kind', ['float32', 'float64'])
 def test_a_waypoint_at_the_edge_of_a_file_is_within_it_as_a_person_writes_both(kind, tmp_path):
     latitudes, longitudes = np.arange(34.7, 36.35, 0.1), np.arange(121.1, 122.95, 0.1)

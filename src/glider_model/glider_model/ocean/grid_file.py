@@ -107,6 +107,7 @@ MAX_BYTES = 400_000_000
 EDGE_DEG = 1e-5
 #: A step of an axis is a hole if it is so many times as wide as those beside it.
 HOLE_STEPS = 2.5
+DAY_S = 86400.0
 #: The fingerprint of a file is made of its size and so many bytes at either end.
 _ENDS = 1_000_000
 
@@ -446,6 +447,13 @@ def _refuse_uncovered(axes: Axes, window: Window) -> None:
             f'the mission lasts {window.lasts:,.0f} s (allowed: '
             f'<= {axes.times[-1] - axes.times[0]:,.0f} s, the times of the file)'
         )
+    begin = axes.times[0] if math.isnan(window.begin) else window.begin
+    first, last = (DAY_S * day for day in _hole(axes.times / DAY_S))
+    if begin < last and begin + window.lasts > first:
+        raise ValueError(
+            f'no water between {told_time(first)} and {told_time(last)}, of the mission '
+            f'(allowed: steps of <= {HOLE_STEPS:g} times those beside them)'
+        )
     for name, values, low, high in (
         ('latitude', axes.latitudes, window.south, window.north),
         ('longitude', axes.longitudes, window.west, window.east),
@@ -461,7 +469,7 @@ def _refuse_uncovered(axes: Axes, window: Window) -> None:
 
 
 def _hole(values: np.ndarray) -> tuple[float, float]:
-    """Where an axis has no points (deg): behind its ends, if they are turned to the same side."""
+    """Where an axis has no points (deg, days): behind its ends, if they are turned to one side."""
     steps = [float(step) for step in np.diff(values)]
     widest = max(range(len(steps)), key=steps.__getitem__, default=0)
     beside = steps[max(0, widest - 1) : widest] + steps[widest + 1 : widest + 2]
