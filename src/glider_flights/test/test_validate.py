@@ -386,6 +386,12 @@ def test_what_cannot_be_flown_is_told(file, dive, tmp_path):
         validate(flight, 'seaglider', 'pitch', None, None, quiet, of_another)
 
 
+@pytest.mark.parametrize(('vehicle', 'is_told'), [('slocum_g2', True), ('seaglider', False)])
+def test_a_vehicle_of_the_other_kind_is_told(file, vehicle, is_told):
+    notes = report(file, '--vehicle', vehicle, '--fit', 'none')['notes']
+    assert ('a seaglider flew this: its vehicle is seaglider, not slocum_g2' in notes) == is_told
+
+
 def test_gsw_that_is_not_there_is_named(file, monkeypatch):
     monkeypatch.setitem(__import__('sys').modules, 'gsw', None)
     assert 'requirements-flights.txt' in told(file, '--vehicle', 'slocum_g2')

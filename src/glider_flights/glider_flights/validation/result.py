@@ -118,6 +118,7 @@ def validate(
         },
         'notes': flight.notes
         + ['no speed by an ADCP at the time of the flight'] * foreign
+        + _other_kind(flight, vehicle)
         + ([why] if why else [])
         + at_bounds(names, begun, learnt),
     }
@@ -126,6 +127,14 @@ def validate(
         for turns, learnt_rates in turn_rates(flown_there).items():
             _try_turns(report[turns], learnt_rates)
     return Validation(pairs, model, adcp, report)
+
+
+def _other_kind(flight: Flight, vehicle: str) -> list[str]:
+    """A note, if the vehicle that is named stands for the other kind of flight."""
+    usual = VEHICLES.get(flight.kind, vehicle)
+    if usual == vehicle or vehicle not in VEHICLES.values():
+        return []
+    return [f'a {flight.kind} flew this: its vehicle is {usual}, not {vehicle}']
 
 
 def _heard(found: list[Track], adcp: Adcp) -> bool:
