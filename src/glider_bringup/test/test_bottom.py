@@ -128,6 +128,21 @@ def test_a_vehicle_that_touches_comes_up_and_the_score_says_so():
     assert 120.0 / 0.5 < told['bottom']['t_s'] < told['sim_time_s']
 
 
+@pytest.mark.parametrize(
+    ('name', 'vehicle', 'pitch_deg', 'heavy_kg'),
+    [('survey', 'seawing', 45.0, 0.8), ('seaglider_1000m', 'seaglider', 40.0, 0.3)],
+)
+def test_a_turn_with_little_weight_teaches_no_short_lead_over_the_bottom(
+    name, vehicle, pitch_deg, heavy_kg
+):
+    fields = {'vehicle': vehicle, 'profile.pitch_deg': pitch_deg, 'water.bottom_m': 80.0}
+    fields |= {'profile.net_heaviness_kg': heavy_kg, 'profile.clearance_m': 5.0, 'dives': 3}
+    fields |= {'profile.depth_m': 200.0, 'profile.surface_every_dives': 0}
+    score = glider_bringup.fly(name, fields).score
+    assert (score['status'], score['bottom']['touched']) == ('completed', False)
+    assert score['bottom']['least_height_m'] > 5.0
+
+
 def test_clearance_is_for_yos():
     with pytest.raises(ConfigurationError, match=r'profile.clearance_m = 10: not along a path'):
         glider_bringup.fly('helix', {'profile.clearance_m': 10.0, 'profile.mode': 'path'})

@@ -248,8 +248,10 @@ def _near_ticks(state, vertical_rate, altitude, params):
     """Ticks for which a dive has been so near to the bottom that it is to turn."""
     if params.clearance == 0.0 or altitude == NO_ECHO or not is_descending(state.stage):
         return 0
-    lead = max(0.0, vertical_rate) * (turn_lead_s(state, params) + NEAR_TICKS * TICK_S)
-    return state.near_ticks + 1 if altitude < params.clearance + lead else 0
+    # what was learnt may be of a turn with little weight
+    lead_s = max(params.lead_s, turn_lead_s(state, params)) + NEAR_TICKS * TICK_S
+    is_near = altitude < params.clearance + max(0.0, vertical_rate) * lead_s
+    return state.near_ticks + 1 if is_near else 0
 
 
 @kernel
