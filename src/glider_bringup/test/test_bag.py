@@ -274,26 +274,38 @@ def test_event_from_before_the_beginning_of_time_is_of_the_first_tick(tmp_path):
 
 
 def test_what_was_commanded_before_the_vehicle_was_heard_is_of_its_first_tick():
-    """Without an input the guard stamps by the wall clock, a simulated vehicle from 0 on."""
+    """Without an input the guard stamps by the wall clock, a simulated vehicle from 0 on.
+
+    All is written as it comes, as a free-running recorder does.
+    """
     written, second_ns = [], 10**9
-    order = TickSorter(['a', 'b'], second_ns, lambda *message: written.append(message))
-    for wall_s in (1_700_000_000, 1_700_000_001):
-        order.add('b', wall_s * second_ns, b'early')
+    order = TickSorter(['a', 'b'], second_ns, lambda *message: written.append(message), {'b'})
+
+    def add(topic, stamp_s):
+        order.add(topic, stamp_s * second_ns, b'')
+        if order.begun:
+            order.write_rest()
+
     order.add_event('path', 0, b'')
-    for tick in range(3):
-        for topic in ('a', 'b'):
-            order.add(topic, tick * second_ns, b'')
-        order.write_complete(lambda stamp_ns: False)
-    begin = [
-        ('a', 0, b''),
-        ('b', 0, b'early'),
-        ('b', 0, b'early'),
-        ('b', 0, b''),
-        ('path', 0, b''),
+    for topic, stamp_s in [('b', 1_700_000_000), ('b', 1_700_000_001), ('a', 0)]:
+        add(topic, stamp_s)
+    order.add_event('told', 1_700_000_001 * second_ns, b'')
+    for topic, stamp_s in [('b', 1_700_000_002), ('a', 1), ('b', 1)]:  # it hears of it late
+        add(topic, stamp_s)
+    assert [message[:2] for message in written] == [
+        *[('a', 0), ('b', 0), ('b', 0), ('path', 0), ('b', 0), ('told', second_ns)],
+        *[('a', second_ns), ('b', second_ns)],
     ]
-    later = [(topic, tick * second_ns, b'') for tick in (1, 2) for topic in ('a', 'b')]
-    assert written == begin + later
     assert order.lost == 0
+
+
+def test_what_is_commanded_where_no_vehicle_is_heard_is_recorded_at_the_end():
+    written = []
+    order = TickSorter(['a', 'b'], 1, lambda *message: written.append(message), {'b'})
+    order.add('b', 7, b'')
+    assert not order.begun
+    order.write_rest()
+    assert written == [('b', 7, b'')]
 
 
 def test_bag_is_as_long_as_its_run_whatever_stamps_events_have():

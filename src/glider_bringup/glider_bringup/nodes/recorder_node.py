@@ -30,7 +30,7 @@ from glider_base.ros.wire.codec import MessageError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.settings import ConfigurationError, Settings
 from glider_base.signals import TICK_NS
-from glider_base.wiring import BELIEFS, SENSORS, WIRING
+from glider_base.wiring import BELIEFS, GUARD, SENSORS, WIRING
 from glider_mission.disk import DiskError
 from glider_mission.recording.ros.rosbag2 import BagWriter, Sync
 from glider_mission.recording.tick_sorter import TickSorter
@@ -77,7 +77,8 @@ class RecorderNode(TickNode):
             )
         except OSError as error:
             raise ConfigurationError(f'{error.filename}: {error.strerror}') from None
-        self.order = TickSorter(per_tick, TICK_NS, self.bag.write)
+        strange = {'fix', *GUARD.outputs}  # may be stamped by another clock
+        self.order = TickSorter(per_tick, TICK_NS, self.bag.write, strange)
         self.recorded_ns = -TICK_NS  #: newest tick that outlives this process
         self.heard_ns = -TICK_NS  #: newest tick of which it has said that all messages are here
         self.has_path = self.replayed = False

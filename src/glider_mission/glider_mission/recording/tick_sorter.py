@@ -4,9 +4,9 @@
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Container, Iterable
 
-#: A stamp so far (ns) before the one that came last is by another clock.
+#: A stamp so far (ns) from that of other topics is by another clock.
 _OTHER_CLOCK_NS = 3600 * 10**9
 
 
@@ -15,7 +15,7 @@ class TickSorter:
 
     Two recordings of one run thereby have the same bytes, whatever the order of arrival was.
     Topics are the per-tick ones in the order in which a tick is written, by calls of ``write``
-    with (topic, stamp_ns, payload).
+    with (topic, stamp_ns, payload). Those of ``followers`` may be stamped by another clock.
     """
 
     def __init__(
@@ -23,8 +23,11 @@ class TickSorter:
         topics: Iterable[str],
         period_ns: int,
         write: Callable[[str, int, bytes], None],
+        followers: Container[str] = (),
     ) -> None:
         self._queues: dict[str, deque[tuple[int, bytes]]] = {name: deque() for name in topics}
+        self._followers = followers
+        self._clock_ns: int | None = None  #: stamp that came last of any other topic
         self._first_ns = 0
         self._newest_ns: dict[str, int] = {}
         self._events: list[tuple[int, str, bytes]] = []
@@ -36,18 +39,21 @@ class TickSorter:
     def add(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Take a message of a per-tick topic.
 
-        What a free-running guard commanded before it heard of the vehicle may be stamped by
-        another clock: it is recorded with the first that is not.
+        What a free-running guard commands before it hears of the vehicle is stamped by another
+        clock: it waits for the first message that is not, and is recorded with that.
         """
-        if not self._newest_ns:  # all topics begin with the same tick
+        begins = not self._newest_ns
+        if topic not in self._followers:
+            begins, self._clock_ns = not self.begun, stamp_ns
+        elif self.begun and abs(stamp_ns - self._clock_ns) > _OTHER_CLOCK_NS:
+            stamp_ns = self._clock_ns
+        if begins:  # all topics with the same tick
             self._first_ns = stamp_ns
             self._newest_ns = dict.fromkeys(self._queues, stamp_ns - self._period_ns)
+            for name, early in self._queues.items():
+                self._queues[name] = deque((stamp_ns, payload) for _, payload in early)
         due_ns = self._newest_ns[topic] + self._period_ns
         self.lost += max(0, (stamp_ns - due_ns) // self._period_ns)
-        if stamp_ns < self._newest_ns[topic] - _OTHER_CLOCK_NS:
-            before = self._queues[topic]
-            self._queues[topic] = deque((stamp_ns, early) for _, early in before)
-            self._first_ns = min(self._first_ns, stamp_ns)
         self._newest_ns[topic] = stamp_ns
         self._queues[topic].append((stamp_ns, payload))
 
@@ -78,8 +84,8 @@ class TickSorter:
 
     @property
     def begun(self) -> bool:
-        """Whether a message of any tick has come."""
-        return bool(self._newest_ns)
+        """Whether it is known what time it is."""
+        return self._clock_ns is not None
 
     def write_rest(self) -> None:
         """Hand on everything, also of ticks that are not complete."""
