@@ -259,13 +259,14 @@ def test_a_plant_of_a_second_glider_does_not_end_the_run(make_graph, context, is
     assert (stop is None) == is_rival
 
 
+@pytest.mark.parametrize('lockstep', [True, False])
 @pytest.mark.parametrize('has_just_begun', [True, False])
 def test_of_two_plants_the_one_that_has_just_begun_leaves(
-    make_graph, context, monkeypatch, has_just_begun
+    make_graph, context, monkeypatch, has_just_begun, lockstep
 ):
     """Both clocks lie in the same place; the other one comes in sight after the first tick."""
     monkeypatch.setattr(clock, '_RIVALS_SHOW_S', 60.0 if has_just_begun else 0.0)
-    graph = make_graph(last_tick=10**9)
+    graph = make_graph(last_tick=10**9, lockstep=lockstep)
     begun_s = time.monotonic()
     assert graph.spin(lambda: time.monotonic() > begun_s + 1.0 and graph.plant.tick > 10) is None
     other, topic = rclpy.create_node(PLANT, namespace='/other', context=context), TOPICS['/clock']

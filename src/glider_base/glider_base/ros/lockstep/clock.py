@@ -88,8 +88,7 @@ class ClockNode(TickNode):
         """Start looking for the peers, for a limited time."""
         self._clock_started_s = time.monotonic()
         super().start_up()
-        if self.ticks.lockstep:
-            self._startup_watch = self.wall_timer(0.25, self._on_startup_watch)
+        self._startup_watch = self.wall_timer(0.25, self._on_startup_watch)
 
     def _peers(self) -> list[str]:
         names = [wired.node for wired in WIRING if wired.node != self.get_name()]
@@ -118,9 +117,13 @@ class ClockNode(TickNode):
             self.fail(f'not ready after {self.ticks.startup_timeout_s:g} s: {missing}')
 
     def _look_for_another_plant(self) -> None:
-        """Leave to one that was there before, as soon as it is in sight and has a name."""
+        """Leave to one that was there before, as soon as it is in sight and has a name.
+
+        Free-running, one of its own name is itself, before it was started again.
+        """
         clock = TOPICS['/clock']
-        for name in filter(None, peers.others(self, clock)):
+        own = '' if self.ticks.lockstep else self.get_fully_qualified_name()
+        for name in {*peers.others(self, clock)} - {'', own}:
             self._leave_to(peers.published_by(self, clock, name))
         if time.monotonic() - self._flies_since_s > _RIVALS_SHOW_S:
             self.destroy_timer(self._startup_watch)
