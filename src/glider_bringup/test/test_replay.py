@@ -399,6 +399,34 @@ def test_plan_of_a_part(short_run):
 
 
 @pytest.mark.parametrize(
+    ('other', 'published'),
+    [
+        ('/dvl/odom', ['/b/clock', '/b/odom', '/b/reference', '/dvl/odom']),
+        ('/dvl/reference', None),  # another glider
+    ],
+)
+def test_of_several_gliders_in_a_bag_none_is_taken_for_the_one(tmp_path, other, published):
+    """As of `ros2 bag record -a`; an odom of something else is no glider."""
+    kinds = dict.fromkeys(['/a/reference', '/a/odom', other], 'nav_msgs/msg/Odometry')
+    with (tmp_path / 'all.mcap').open('wb') as stream:
+        writer = Writer(stream)
+        writer.start(profile='ros2')
+        for name, kind in {'/a/clock': 'rosgraph_msgs/msg/Clock', **kinds}.items():
+            schema = writer.register_schema(kind, 'ros2msg', b'')
+            writer.add_message(writer.register_channel(name, 'cdr', schema), 0, b'', 0)
+        writer.finish()
+    bag = Bag(tmp_path / 'all.mcap')
+    if published:
+        RecordedLog(bag)
+        plan = plan_replay(bag, [], 0.0, None, 'b')
+        assert sorted(plan.names.values()) == published
+        return
+    for read in (RecordedLog, lambda bag: plan_replay(bag, [], 0.0, None, 'b')):
+        with pytest.raises(ConfigurationError, match='/a, /dvl'):
+            read(bag)
+
+
+@pytest.mark.parametrize(
     ('text', 'expected'),
     [
         ('', ('RELIABLE', 'VOLATILE', 1024)),

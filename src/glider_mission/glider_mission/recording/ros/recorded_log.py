@@ -12,7 +12,8 @@ from rclpy.serialization import deserialize_message
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.wire.codec import Codec
-from glider_base.ros.wire.topics import TOPICS, topic_of
+from glider_base.ros.wire.topics import TOPICS, Topic, topic_of
+from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_base.wiring import BELIEFS, SENSORS, WHEN_SILENT
 from glider_guidance.yo.stage import STAGE_NAMES
@@ -26,12 +27,24 @@ _PER_TICK = [topic for topic in TOPICS.values() if topic.per_tick]
 SCORED = ('ground_truth/odom', 'odom', 'joint_states', 'reference', 'tracking_error')
 
 
-def known_name(topic: str) -> str:
-    """Our name of a recorded topic, whatever its namespace; its own if it is none of ours."""
-    for name in TOPICS:
-        if topic == name or topic.endswith('/' + name.lstrip('/')):
-            return name
-    return topic
+def namespaces(bag: Bag) -> list[str]:
+    """Namespaces of the nodes in a bag, ``'/'`` for the root.
+
+    Those that have a `reference`, as others may have an `odom` of theirs, if there are any.
+    """
+    found: dict[str, set[str]] = {}
+    for topic in bag.topics:
+        ours = next((one for one in TOPICS.values() if topic.name.endswith(f'/{one.name}')), None)
+        if ours and topic.type_name == ours.type_name:
+            found.setdefault(topic.name.removesuffix(f'/{ours.name}') or '/', set()).add(ours.name)
+    return sorted([place for place in found if 'reference' in found[place]] or found)
+
+
+def known_topics(namespace: str) -> dict[str, Topic]:
+    """Topics by the names that they have where the nodes are in a namespace."""
+    known = {topic.full_name(namespace): topic for topic in TOPICS.values()}
+    # several gliders have a clock each
+    return known | {f'{namespace.rstrip("/")}/clock': TOPICS['/clock']}
 
 
 def _stage_number(name: str) -> float:
@@ -96,6 +109,11 @@ class RecordedLog:
     steers_by : str
         Name of the vehicle's steering surface; empty without.
 
+    Raises
+    ------
+    ConfigurationError
+        If the bag holds several gliders.
+
     Attributes
     ----------
     ticks : int
@@ -111,7 +129,15 @@ class RecordedLog:
         self.ticks = 0
         self.counts: Counter[str] = Counter()
         self.end: health.Report | None = None
-        self._recorded = {known_name(topic.name) for topic in bag.topics}
+        found = namespaces(bag)
+        if len(found) > 1:
+            raise ConfigurationError(
+                f'{bag.files[0]}: several gliders are recorded: {", ".join(found)}; a bag of one '
+                f'is needed'
+            )
+        known = known_topics(*found or '/')
+        #: Our names of what is recorded, and those of others, by index.
+        self._topics = [getattr(known.get(one.name), 'name', one.name) for one in bag.topics]
         self._names = (*SCORED, *also)
         self._codecs = {name: topic_of(name, steers_by).codec for name in self._names}
         #: Tick, column and new value, in the order in which they were told.
@@ -128,11 +154,10 @@ class RecordedLog:
         They are float64[n, ROW], valid until the next are asked for. A `ConfigurationError` says
         where the bag is damaged.
         """
-        names = {i: known_name(topic.name) for i, topic in enumerate(self._bag.topics)}
         for batch in self._bag.batches():
             found = {}
             for index in np.unique(batch.topic):
-                name, chosen = names[int(index)], np.flatnonzero(batch.topic == index)
+                name, chosen = self._topics[index], np.flatnonzero(batch.topic == index)
                 self.counts[name] += len(chosen)
                 if name == '/diagnostics':
                     self._hear(batch, chosen)
@@ -250,7 +275,7 @@ class RecordedLog:
 
     def recorded(self) -> dict[str, int]:
         """Messages of every topic that ought to have one per tick, by topic."""
-        left_out = {*SENSORS, *BELIEFS, *WHEN_SILENT} - self._recorded
+        left_out = {*SENSORS, *BELIEFS, *WHEN_SILENT}.difference(self._topics)
         if not self.counts['ground_truth/odom']:
             left_out |= {'ground_truth/odom'}
         names = (topic.name for topic in _PER_TICK if topic.name not in left_out)

@@ -11,10 +11,10 @@ from rclpy.serialization import deserialize_message
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.wire.codec import Codec
-from glider_base.ros.wire.topics import TOPICS, topic_of
+from glider_base.ros.wire.topics import topic_of
 from glider_base.settings import ConfigurationError
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.recording.ros.recorded_log import decode, known_name
+from glider_mission.recording.ros.recorded_log import decode, known_topics, namespaces
 
 #: Messages of foreign layout whose bytes are kept, for each topic.
 _KEPT = 1000
@@ -109,8 +109,7 @@ class Recording:
         steers_by: str = '',
     ) -> None:
         self.namespace = choose_namespace(bag, namespace)
-        known = {topic.full_name(self.namespace): topic for topic in TOPICS.values()}
-        known[self.node('clock')] = TOPICS['/clock']  # several gliders have a clock each
+        known = known_topics(self.namespace)
         self.series: dict[str, Series] = {}
         self.paths: list[bytes] = []
         self.events: list[Event] = []
@@ -160,13 +159,8 @@ class Recording:
 
 def choose_namespace(bag: Bag, given: str | None) -> str:
     """Namespace of the nodes in a bag, ``'/'`` for the root."""
-    found = set()
-    for recorded in bag.topics:
-        topic = TOPICS.get(known_name(recorded.name))
-        is_ours = topic is not None and recorded.type_name == topic.type_name
-        if is_ours and not topic.name.startswith('/'):
-            found.add(recorded.name.removesuffix(topic.name).rstrip('/') or '/')
-    named = ', '.join(sorted(found))
+    found = namespaces(bag)
+    named = ', '.join(found)
     if given is not None:
         wanted = '/' + given.strip('/')
         if wanted not in found:
@@ -185,4 +179,4 @@ def choose_namespace(bag: Bag, given: str | None) -> str:
         raise ConfigurationError(
             f'{bag.files[0]}: several namespaces are recorded: give --namespace (allowed: {named})'
         )
-    return found.pop()
+    return found[0]

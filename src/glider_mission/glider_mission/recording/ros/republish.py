@@ -29,7 +29,7 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_base.wiring import present
 from glider_mission.recording.mcap_reader import Bag, BagTopic, Batch
-from glider_mission.recording.ros.recorded_run import choose_namespace
+from glider_mission.recording.ros.recorded_log import namespaces
 
 #: Sleeps and waits are cut into pieces of this length (s), so that Ctrl-C is heard.
 _PATIENCE_S = 0.1
@@ -74,12 +74,13 @@ def plan_replay(
     topics of the nodes go to ``namespace``, if it is given, instead of the recorded one. A
     ConfigurationError names the option, and what is recorded; also if nothing is to be published.
     """
-    try:
-        recorded = choose_namespace(bag, None)
-    except ConfigurationError as error:
-        if namespace is not None:
-            raise ConfigurationError(f'--namespace {namespace}: {error}') from None
-        recorded = '/'  # a bag of others needs none to be replayed as it is
+    found = namespaces(bag)
+    if namespace is not None and len(found) != 1:
+        raise ConfigurationError(
+            f'--namespace {namespace}: takes the place of one namespace, and {bag.files[0]} has '
+            f'{", ".join(found) or "none of these nodes"}'
+        )
+    recorded = found[0] if len(found) == 1 else '/'  # to be replayed as it is
     names = [topic.name for topic in bag.topics]
     asked = [_find_topic(names, name, recorded) for name in topics] or names
     wanted = {*asked, '/clock'}.intersection(names)
@@ -100,7 +101,8 @@ def plan_replay(
         raise ConfigurationError(
             f'--namespace {namespace}: not usable (allowed: {NAMESPACE_ALLOWED})'
         )
-    ours = {one.full_name(recorded): one.full_name(published) for one in TOPICS.values()}
+    ours = {f'{recorded.rstrip("/")}/clock': f'{published.rstrip("/")}/clock'}
+    ours |= {one.full_name(recorded): one.full_name(published) for one in TOPICS.values()}
     renamed = {name: ours.get(name, name) for name in wanted}
     plan = Plan(
         bag=bag,
