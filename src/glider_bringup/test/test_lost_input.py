@@ -20,7 +20,7 @@ from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_NS
 from glider_control.nodes.control_node import ControlNode
 from glider_guard.nodes.guard_node import GuardNode
-from glider_guard.rows import LOST, ORDERED
+from glider_guard.rows import DEPTH_WRONG, LOST, ORDERED
 from glider_guard.settings import GuardSettings
 
 LEVEL = (0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -133,6 +133,28 @@ def test_a_clock_that_is_set_forward_is_no_lost_input(flight, monkeypatch, heard
     flight.until(lambda: len(vehicle.commands) > before + 4)
     assert not vehicle.said('for good')
     assert not heard or SAFE not in vehicle.commands[before:]
+
+
+def test_what_sinks_while_the_guard_is_paused_has_not_jumped(flight):
+    """As a managed node that is deactivated for a minute; what jumps in a second has."""
+    vehicle, depth_m = flight.vehicle, -LEVEL[2]
+
+    def sunk(by_m: float, s: float) -> bool:
+        nonlocal depth_m
+        flight.guard.pause()
+        depth_m += by_m
+        vehicle.stamp_ns += int(s * 1e9)
+        odom = (*LEVEL[:2], -depth_m, *LEVEL[3:], *CERTAIN)
+        vehicle.says = {**INPUTS, 'odom': odom}
+        heard = flight.guard.inputs[0]
+        flight.until(lambda: heard.stamp_ns == vehicle.stamp_ns)
+        flight.guard.begin()
+        before = len(vehicle.commands)
+        flight.until(lambda: len(vehicle.commands) > before + 25)
+        return bool(flight.guard.state.told & DEPTH_WRONG)
+
+    assert not sunk(12.0, 60.0)
+    assert sunk(50.0, 1.0)
 
 
 def test_silence_is_seen_by_a_clock_of_coarse_steps_too(flight, monkeypatch):
