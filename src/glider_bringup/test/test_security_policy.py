@@ -43,6 +43,17 @@ PARAMETERS = tuple(
         'set_parameters_atomically',
     )
 )
+#: What a managed one answers, beside what it says of its transitions.
+LIFECYCLE = tuple(
+    f'~/{name}'
+    for name in (
+        'change_state',
+        'get_available_states',
+        'get_available_transitions',
+        'get_state',
+        'get_transition_graph',
+    )
+)
 SERVICES = {PLANT: ('pause',), GUIDANCE: ('abort',), GUARD: ('clear_guard',)}
 COMMENT = (
     ' What each node may do, for installations with DDS Security; docs/security.md says how. '
@@ -61,6 +72,10 @@ def rights(node: str) -> dict[str, set[str]]:
     if node == GUIDANCE:
         publish |= {'path', 'mission/status'}
         subscribe.add('battery')
+    replies = {*PARAMETERS, *SERVICES.get(node, ())}
+    if block in ON_BOARD:
+        publish.add('~/transition_event')
+        replies |= {*LIFECYCLE}
     if node == PLANT:
         subscribe |= {'recorded', 'heard'}
     if node == RECORDER:
@@ -70,7 +85,7 @@ def rights(node: str) -> dict[str, set[str]]:
     return {
         'publish': publish,
         'subscribe': subscribe,
-        'reply': {*PARAMETERS, *SERVICES.get(node, ())},
+        'reply': replies,
     }
 
 
@@ -114,8 +129,14 @@ def graph(tmp_path_factory):
     with domain_id() as domain:
         rclpy.init(context=context, domain_id=domain)
         record = Parameter('record', value=True)
+        managed = [Parameter('managed', value=True), Parameter('lockstep', value=False)]
+        aboard = {wired.node: managed for wired in ON_BOARD}
         said = {'context': context, 'namespace': APART}
-        made = [node(parameter_overrides=[record], **said) for node in nodes]
+        made = []
+        for node, wired in zip(nodes, WIRING, strict=True):
+            made.append(node(parameter_overrides=aboard.get(wired.node, [record]), **said))
+            if wired in ON_BOARD:
+                made[-1].on_ready()
         given = [record, Parameter('folder', value=str(folder))]
         made.append(RecorderNode(parameter_overrides=given, **said))
         yield {node.get_name(): _rights_of(node) for node in made}
