@@ -25,6 +25,9 @@ from glider_bringup.engines.launch_plan import (
 )
 from glider_bringup.engines.processes import PLANT
 
+#: Where a launch keeps the namespaces whose plants have not ended.
+_FLYING = 'gliders_flying'
+
 
 def generate_launch_description() -> LaunchDescription:
     """Arguments, and a function that starts the nodes once their values are known."""
@@ -49,6 +52,8 @@ def start(context: LaunchContext) -> list:
         for argument in ARGUMENTS
     }
     plan = plan_launch(values, Path(launch.logging.launch_config.log_dir))
+    if PLANT in (node.executable for node in plan.nodes):
+        context.extend_globals({_FLYING: flying(context) | {plan.namespace}})
     said = f'{plan.scenario.name}: {plan.scenario.description} ({plan.parameters_file})'
     actions = [LogInfo(msg=said), *(node_action(node, plan) for node in plan.nodes)]
     if plan.managed:
@@ -56,6 +61,11 @@ def start(context: LaunchContext) -> list:
         steps = [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE]
         actions.append(LifecycleTransition(lifecycle_node_names=names, transition_ids=steps))
     return actions
+
+
+def flying(context: LaunchContext) -> set[str]:
+    """Namespaces of the gliders of this launch whose plants have not ended."""
+    return context.get_locals_as_dict().get(_FLYING, set())
 
 
 def node_action(node: LaunchedNode, plan: LaunchPlan) -> Node:
@@ -78,8 +88,8 @@ def node_action(node: LaunchedNode, plan: LaunchPlan) -> Node:
 def on_exit(name: str, plan: LaunchPlan) -> Callable[[ProcessExited, LaunchContext], Any]:
     """What the end of a node means.
 
-    The plant ends the run. In lockstep nobody can go on without a peer that failed; free-running
-    nodes can, and nobody needs the node for transforms.
+    The last plant ends the launch. In lockstep nobody can go on without a peer that failed;
+    free-running nodes can, and nobody needs the node for transforms.
     """
 
     def end(event: ProcessExited, context: LaunchContext) -> Shutdown | None:
@@ -88,6 +98,9 @@ def on_exit(name: str, plan: LaunchPlan) -> Callable[[ProcessExited, LaunchConte
         if event.returncode and (name == PLANT or (plan.lockstep and name != TF)):
             # Only an exception gives `ros2 launch` an exit code, 1; a Shutdown would be a success.
             raise RuntimeError(f'{name} ended with exit code {event.returncode}; the run is over')
-        return Shutdown(reason='the run is complete') if name == PLANT else None
+        if name != PLANT:
+            return None
+        context.extend_globals({_FLYING: flying(context) - {plan.namespace}})
+        return None if flying(context) else Shutdown(reason='the run is complete')
 
     return end

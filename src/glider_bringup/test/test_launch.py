@@ -358,6 +358,22 @@ def test_end_of_a_node_ends_the_launch_when_it_has_to(
     assert on_exit(event, context) is None
 
 
+def test_a_launch_of_two_gliders_goes_on_until_both_have_flown(launch_module, start, tmp_path):
+    """As of a launch file that includes this one twice."""
+    import launch
+    from launch.actions import Shutdown
+
+    event, context = type('Exited', (), {'returncode': 0})(), launch.LaunchContext()
+    ends = []
+    for name in ('alpha', 'beta'):
+        given = {argument.name: argument.default for argument in ARGUMENTS}
+        context.launch_configurations.update(given | {'namespace': name})
+        launch_module.start(context)
+        plan = plan_launch({'namespace': name}, tmp_path)
+        ends.append(launch_module.on_exit(PLANT, plan))
+    assert [type(end(event, context)) for end in ends] == [type(None), Shutdown]
+
+
 @pytest.mark.parametrize(('code', 'expected'), [(0, 0), (3, 1)])
 def test_exit_code_of_a_launch_is_that_of_the_run(launch_module, tmp_path, code, expected):
     import launch
