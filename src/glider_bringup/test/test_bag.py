@@ -18,6 +18,7 @@ from nav_msgs.msg import Path as PathMessage
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from glider_base.ros.lockstep import health
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_NS
@@ -416,6 +417,23 @@ def test_rows_are_whole_where_a_recorder_from_outside_mixed_up_ticks(tmp_path, m
     rows = np.concatenate([block.copy() for block in RecordedLog(Bag(tmp_path)).blocks()])
     for name in SCORED:
         assert rows[:, COLUMNS[name].start].tolist() == list(range(100))
+
+
+def test_rows_tell_nothing_of_another_glider(tmp_path):
+    """All tell on /diagnostics, and a recorder from outside keeps what all of them say."""
+    bag = BagWriter(tmp_path, 'outside')
+    for tick in range(10):
+        for name in SCORED:
+            codec = TOPICS[name].codec
+            bag.write(name, tick * TICK_NS, codec.encode(tick * TICK_NS, np.ones(codec.width)))
+    for tick, place, mask in [(3, '/glider', 4), (5, '/other', 1)]:
+        said = {'saturation': mask}
+        node = f'{place}/control_node'
+        told = health.status_array(tick * TICK_NS, node, health.WARN, 'at its limit', said)
+        bag.write('/diagnostics', tick * TICK_NS, to_cdr(told))
+    bag.close()
+    (rows,) = (block.copy() for block in RecordedLog(Bag(tmp_path)).blocks())
+    assert rows[:, COLUMNS['saturation']].tolist() == 3 * [0.0] + 7 * [4.0]
 
 
 @pytest.mark.parametrize('last', [100, BLOCK_TICKS, 5 * BLOCK_TICKS])

@@ -135,7 +135,8 @@ class RecordedLog:
                 f'{bag.files[0]}: several gliders are recorded: {", ".join(found)}; a bag of one '
                 f'is needed'
             )
-        known = known_topics(*found or '/')
+        (self._namespace,) = found or '/'
+        known = known_topics(self._namespace)
         #: Our names of what is recorded, and those of others, by index.
         self._topics = [getattr(known.get(one.name), 'name', one.name) for one in bag.topics]
         self._names = (*SCORED, *also)
@@ -178,6 +179,8 @@ class RecordedLog:
             try:
                 array = deserialize_message(batch.payload(index), DiagnosticArray)
             except Exception:  # the middleware has no class for bytes that are no message
+                continue
+            if not health.concerns(array, self._namespace):
                 continue
             self.end = self.end or health.end_of_run(array)
             tick = health.stamp_of(array) // TICK_NS
