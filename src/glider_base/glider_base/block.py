@@ -24,7 +24,7 @@ class Said(NamedTuple):
 
     level: str  #: 'ok', 'warn' or 'error'
     message: str
-    values: dict[str, object]
+    values: dict[str, object] = {}
 
 
 class Block(NamedTuple):

@@ -16,6 +16,7 @@ from pydantic import Field
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Header
 
+from glider_base.block import Said
 from glider_base.errors import EXIT_FAILED
 from glider_base.ros.hearing.gids import gid_of
 from glider_base.ros.hearing.inputs import Input
@@ -141,9 +142,9 @@ class RecorderNode(TickNode):
     def tell_successor(self, item: Input, silent_s: float) -> None:
         """Nothing: those who need the topic tell."""
 
-    def condition(self) -> health.Condition:
+    def condition(self) -> Said:
         """How this node is."""
-        return health.Condition(health.OK, 'recording')
+        return Said('ok', 'recording')
 
     def on_signal(self, number, frame) -> None:
         """Remember to stop; `drain` does it, with everything that is under way."""

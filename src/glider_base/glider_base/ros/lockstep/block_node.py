@@ -8,7 +8,7 @@ from pydantic import Field
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
-from glider_base.block import Block, Telling, optional_topics
+from glider_base.block import Block, Said, Telling, optional_topics
 from glider_base.kernel import compiling_told
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.node import TickSettings
@@ -157,13 +157,12 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         self.said, self.flags = (stamp_ns, outputs), flags
         self.repeat()
 
-    def condition(self) -> health.Condition:
+    def condition(self) -> Said:
         """How this node is: what its block says."""
         condition = super().condition()
-        if self.flags is None or not self.block.say or condition.level != health.OK:
+        if self.flags is None or not self.block.say or condition.level != 'ok':
             return condition
-        said = self.block.say(*self.flags)
-        return health.Condition(health.LEVELS[said.level], said.message, said.values)
+        return self.block.say(*self.flags)
 
     def repeat(self) -> None:
         """Send the last answer, once more if no time has passed since."""

@@ -9,7 +9,7 @@ what holds once in a second, for tools that take silence for a failure, and is n
 """
 
 import struct
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
@@ -140,14 +140,6 @@ def concerns(array: DiagnosticArray, namespace: str) -> bool:
     )
 
 
-class Condition(NamedTuple):
-    """How a node is."""
-
-    level: bytes
-    message: str
-    values: dict[str, Any] = {}
-
-
 class Pulse:
     """Repeats how a node is.
 
@@ -157,7 +149,7 @@ class Pulse:
     def __init__(self, node: Node, publisher: Publisher) -> None:
         self._node, self._publisher = node, publisher
         self._second = -1
-        self._said: Condition | None = None
+        self._said: Said | None = None
         self._raw = bytearray()
 
     def beat(self, now_ns: int, stamp_ns: int) -> None:
@@ -165,10 +157,11 @@ class Pulse:
         if now_ns // _SECOND_NS == self._second:
             return
         self._second = now_ns // _SECOND_NS
-        condition = self._node.condition()
-        if condition != self._said:
+        said = self._node.condition()
+        if said != self._said:
             name = self._node.get_fully_qualified_name()
-            self._said = condition
-            self._raw = bytearray(to_cdr(status_array(0, name, *condition)))
+            self._said = said
+            array = status_array(0, name, LEVELS[said.level], said.message, said.values)
+            self._raw = bytearray(to_cdr(array))
         _STAMP.pack_into(self._raw, _STAMP_AT, *divmod(stamp_ns, _SECOND_NS))
         self._publisher.publish(bytes(self._raw))

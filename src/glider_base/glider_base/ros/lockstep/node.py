@@ -19,6 +19,7 @@ from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallba
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from glider_base.block import Said
 from glider_base.errors import EXIT_PEER
 from glider_base.ros.hearing.gids import gid_of, shown
 from glider_base.ros.hearing.inputs import Input
@@ -180,9 +181,9 @@ class TickNode(Node):
         self.events_told += 1
         self._events.publish(to_cdr(array))
 
-    def condition(self) -> health.Condition:
+    def condition(self) -> Said:
         """How this node is, as it repeats it on /diagnostics."""
-        return health.Condition(health.OK, 'running')
+        return Said('ok', 'running')
 
     def count_events(self, stamp_ns: int) -> None:
         """Tell the recorder how many events there were up to a tick, so that it has them all."""

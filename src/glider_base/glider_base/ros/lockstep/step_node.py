@@ -5,6 +5,7 @@
 import math
 import time
 
+from glider_base.block import Said
 from glider_base.ros.hearing.inputs import Input
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.node import TickNode
@@ -140,10 +141,10 @@ class StepNode(TickNode):
         stamp_ns = max(item.stamp_ns for item in self._ticking)
         return stamp_ns if stamp_ns >= 0 else self.get_clock().now().nanoseconds
 
-    def condition(self) -> health.Condition:
+    def condition(self) -> Said:
         """How this node is: without its inputs it is not well."""
         if self._stale:
-            return health.Condition(health.ERROR, self._missing())
+            return Said('error', self._missing())
         return super().condition()
 
     def _missing(self) -> str:
