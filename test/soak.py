@@ -14,7 +14,7 @@ from rich.table import Table
 
 from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED
 from glider_base.signals import TICK_S
-from glider_bringup.console import Json, messages, number, output, progress, tell
+from glider_bringup.console import Json, messages, output, progress, tell
 from glider_mission.scenario import Scenario, load_scenario
 
 app = typer.Typer(pretty_exceptions_enable=False)
@@ -50,8 +50,6 @@ def soak(
     from glider_mission.choices import chosen_fields
     from glider_mission.run_folder import make_run_folder
 
-    if duration != 'full':
-        duration = number('--duration', duration, 'full', TICK_S, 1e8)
     flown = load_scenario(scenario, chosen_fields({}, duration=duration))
     folder = make_run_folder(flown, out)
     messages.print(f'{flown.name}: over nodes, into {folder}', soft_wrap=True)

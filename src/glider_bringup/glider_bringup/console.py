@@ -26,7 +26,7 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from glider_base.errors import EXIT_INTERRUPTED, ConfigurationError, printable
+from glider_base.errors import EXIT_INTERRUPTED, printable
 from glider_base.signals import TICK_S
 from glider_control.settings import ControlLawSettings
 from glider_mission.changes import parse_assignment
@@ -124,19 +124,6 @@ def changed_fields(changes: list[str] | None) -> dict[str, Any]:
 def beside(run: Path, name: str) -> Path:
     """File in a run's folder or, if the run is an MCAP file alone, beside it."""
     return (run if run.is_dir() else run.parent) / name
-
-
-def number(option: str, text: str, word: str, low: float, high: float) -> float:
-    """Number of an option that also takes a word."""
-    try:
-        number = float(text)
-    except ValueError:
-        number = float('nan')
-    if not low <= number <= high:
-        raise ConfigurationError(
-            f'{option} {text}: not usable (allowed: {low:g} to {high:g}, or {word})'
-        )
-    return number
 
 
 def tell(line: str) -> None:

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person chooses for a flight beside its scenario, as fields of the scenario."""
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
+from glider_base.errors import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
 
@@ -32,16 +34,31 @@ def combination_of(scenario: Scenario) -> Combination:
     )
 
 
+def number(option: str, text: str, word: str, low: float, high: float) -> float:
+    """Number of an option that also takes a word; ``option`` as it stands before its value."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = float('nan')
+    if not low <= number <= high:
+        raise ConfigurationError(
+            f'{option}{text}: not usable (allowed: {low:g} to {high:g}, or {word})'
+        )
+    return number
+
+
 def chosen_fields(
     changes: dict[str, Any],
     controller: str | None = None,
     guidance: str | None = None,
     seed: int | None = None,
-    duration: float | Literal['full'] | None = None,
+    duration: float | str | None = None,
+    option: str = '--duration ',
 ) -> dict[str, Any]:
     """Values by dotted name, for `load_scenario`: changes, and what is said by options.
 
-    A duration is simulated time (s), or that of the whole scenario; by default its dives.
+    A duration is simulated time (s), or that of the whole scenario: full; by default its dives.
+    Raises ConfigurationError with its ``option`` if it is none.
     """
     fields = dict(changes)
     if controller is not None:
@@ -53,5 +70,5 @@ def chosen_fields(
     if duration is not None:
         fields['dives'] = 0
         if duration != 'full':
-            fields['duration_s'] = duration
+            fields['duration_s'] = number(option, str(duration), 'full', TICK_S, 1e8)
     return fields

@@ -14,7 +14,6 @@ import typer
 from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, EXIT_SURFACED
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
 from glider_base.settings import ConfigurationError
-from glider_base.signals import TICK_S
 from glider_bringup.console import (
     Changes,
     Json,
@@ -22,14 +21,13 @@ from glider_bringup.console import (
     Named,
     changed_fields,
     messages,
-    number,
     progress,
     tell,
 )
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.showing.scorecard import STYLES, print_card, print_places
 from glider_guidance.settings import METHODS, OLD_NAMES
-from glider_mission.choices import ENGINES, chosen_fields
+from glider_mission.choices import ENGINES, chosen_fields, number
 from glider_mission.disk import DiskError, write_whole
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 
@@ -125,8 +123,6 @@ def run(
     """
     from glider_mission.run_folder import REPORT_FILE
 
-    if duration not in (None, 'full'):
-        duration = number('--duration', duration, 'full', TICK_S, 1e8)
     fields = chosen_fields(changed_fields(changes), controller, guidance, seed, duration)
     if sync != 'end' and engine == 'direct' and not bag:
         raise ConfigurationError(f'--sync {sync}: nothing is recorded (allowed: with --bag)')
@@ -152,7 +148,7 @@ def _checked(
 
     A ConfigurationError names the option, and what is allowed.
     """
-    rate = 0.0 if speed == 'max' else number('--speed', speed, 'max', 0.01, 1e6)
+    rate = 0.0 if speed == 'max' else number('--speed ', speed, 'max', 0.01, 1e6)
     if rate and engine == 'direct':
         raise ConfigurationError('--speed: the direct engine knows only max')
     place = absolute_namespace(namespace) if namespace else None

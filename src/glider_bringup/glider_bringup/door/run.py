@@ -17,7 +17,6 @@ import numpy as np
 from glider_base.errors import shown
 from glider_base.ros.places import given_domain
 from glider_base.settings import ConfigurationError
-from glider_base.signals import TICK_S
 from glider_bringup.engines.compiling import told
 from glider_bringup.engines.flight import Progress, Taker
 from glider_bringup.engines.flight import fly as fly_direct
@@ -146,14 +145,10 @@ def chosen_scenario(
     duration: float | str | None,
 ) -> Scenario:
     """The scenario that the arguments of `fly` ask for."""
-    from glider_bringup.console import number
-
     if not isinstance(fields, Mapping):
         raise ConfigurationError(
             f'set = {shown(fields)}: not usable (allowed: values by dotted field name)'
         )
-    if duration not in (None, 'full'):
-        duration = number('--duration', str(duration), 'full', TICK_S, 1e8)
     if law is not None and controller is not None:
         raise ConfigurationError(f'--controller {controller}: not with a law of your own')
     own = own_law(law) if law is not None else None

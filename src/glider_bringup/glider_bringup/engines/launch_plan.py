@@ -15,7 +15,6 @@ from typing import NamedTuple
 from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
 from glider_base.ros.wire.topics import CURRENT, NAVIGATION
 from glider_base.settings import ConfigurationError
-from glider_base.signals import TICK_S
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import (
     AUTOPILOT,
@@ -29,7 +28,7 @@ from glider_bringup.engines.processes import (
 )
 from glider_control.settings import LAWS
 from glider_guidance.settings import METHODS, OLD_NAMES
-from glider_mission.choices import chosen_fields
+from glider_mission.choices import chosen_fields, number
 from glider_mission.run_folder import (
     PARAMETERS_FILE,
     SCENARIO_FILE,
@@ -174,7 +173,7 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
         if argument.choices and text[argument.name] not in argument.choices:
             _refuse(argument.name, text, ', '.join(filter(None, argument.choices)))
     lockstep = _TRUTH[text['lockstep']]
-    speed = 0.0 if text['speed'] == 'max' else _number('speed', text, 0.01, 1e6, 'max')
+    speed = 0.0 if text['speed'] == 'max' else number('speed:=', text['speed'], 'max', 0.01, 1e6)
     if not lockstep and speed != 1.0:
         _refuse('speed', text, '1.0 with lockstep:=false, whose nodes act in wall time')
     simulate = _TRUTH[text['simulate']]
@@ -259,19 +258,7 @@ def _changes(text: dict[str, str]) -> dict:
     controller, guidance, duration = (
         text[name] or None for name in ('controller', 'guidance', 'duration')
     )
-    if duration not in (None, 'full'):
-        duration = _number('duration', text, TICK_S, 1e8, 'full')
-    return chosen_fields({}, controller, guidance, duration=duration)
-
-
-def _number(name: str, text: dict[str, str], low: float, high: float, word: str) -> float:
-    try:
-        number = float(text[name])
-    except ValueError:
-        number = float('nan')
-    if not low <= number <= high:
-        _refuse(name, text, f'{low:g} to {high:g}, or {word}')
-    return number
+    return chosen_fields({}, controller, guidance, duration=duration, option='duration:=')
 
 
 def _refuse(name: str, text: dict[str, str], allowed: str) -> None:

@@ -18,7 +18,6 @@ from glider_bringup.console import (
     Workers,
     changed_fields,
     messages,
-    number,
     output,
     picked,
     print_table,
@@ -68,13 +67,13 @@ def montecarlo(
     end; those that surfaced for good, were lost or failed are counted. Of less than 20 flights
     p95 is the worst.
     """
-    from glider_mission.choices import combination_of
+    from glider_mission.choices import combination_of, number
     from glider_mission.run_folder import make_result_folder
     from glider_studies import montecarlo as study
 
     fields = changed_fields(changes)
     if duration != 'full':
-        fields['duration_s'] = number('--duration', duration, 'full', TICK_S, 1e8)
+        fields['duration_s'] = number('--duration ', duration, 'full', TICK_S, 1e8)
     laws = picked(controller, Controller)
     scenarios = study.make_scenarios(scenario, fields, laws, plants, seed, faults)
     if out:

@@ -13,11 +13,11 @@ from glider_bringup.console import (
     Json,
     Run,
     interrupted_told,
-    number,
     output,
     progress_bar,
     tell,
 )
+from glider_mission.choices import number
 
 app = typer.Typer()
 
@@ -57,7 +57,7 @@ def replay(
     from glider_mission.recording.mcap_reader import Bag
     from glider_mission.recording.ros import republish as work
 
-    factor = float('inf') if rate == 'max' else number('--rate', rate, 'max', 0.001, 1e6)
+    factor = float('inf') if rate == 'max' else number('--rate ', rate, 'max', 0.001, 1e6)
     names = [name for text in topics or () for name in text.split(',') if name]
     bag = Bag(run)
     plan = work.plan_replay(bag, names, start, duration, namespace)
