@@ -24,8 +24,8 @@ from glider_bringup.console import (
     progress,
     tell,
 )
-from glider_bringup.scoring.card import STOPPED
-from glider_bringup.showing.scorecard import STYLES, print_card, print_places
+from glider_bringup.scoring.card import STATUSES, STOPPED
+from glider_bringup.showing.scorecard import print_card, print_places
 from glider_guidance.settings import METHODS, OLD_NAMES
 from glider_mission.choices import ENGINES, chosen_fields, number
 from glider_mission.disk import DiskError, write_whole
@@ -226,7 +226,7 @@ def _fly(
         has_room = _write_report(scenario, folder, card, tracer)
     if card['reason']:
         text = f'{card["status"]}: {card["reason"]}'
-        messages.print(text, style=STYLES[card['status']], soft_wrap=True)
+        messages.print(text, style=STATUSES[card['status']], soft_wrap=True)
     return card, folder, has_room
 
 

@@ -19,7 +19,16 @@ from glider_mission.run_folder import SCORE_FILE
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
 
-STATUSES = ('completed', 'unfinished', 'surfaced', 'lost', 'infeasible', 'aborted', 'failed')
+#: What may become of a run, and the colour of that word.
+STATUSES = {
+    'completed': 'green',
+    'unfinished': 'yellow',
+    'surfaced': 'yellow',
+    'lost': 'bold red',
+    'infeasible': 'yellow',
+    'aborted': 'red',
+    'failed': 'red',
+}
 #: A figure this large is of a number that grew without limit, whatever its unit: it is not known.
 LARGEST = 1e15
 #: Statuses of runs that were not flown to their end.
@@ -173,7 +182,7 @@ _Card = _part(
     guidance=str,
     engine=str | None,
     seed=_Count,
-    status=Literal[STATUSES],
+    status=Literal[tuple(STATUSES)],
     reason=str,
     ticks=_Count,
     messages_recorded=_Count,

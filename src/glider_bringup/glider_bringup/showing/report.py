@@ -9,6 +9,7 @@ from typing import Any
 from glider_base.files import yaml_text
 from glider_base.frames import to_geodetic
 from glider_base.signals import TICK_S
+from glider_bringup.scoring.card import STATUSES
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import Dive, dives_of
 from glider_bringup.showing.findings import findings, verdict
@@ -19,15 +20,8 @@ from glider_bringup.showing.words import count, span, way
 from glider_mission.chart import place_told
 from glider_model.ocean.current_settings import KNOT_MPS
 
-_BADGES = {
-    'completed': '✓ Completed',
-    'unfinished': '! Unfinished',
-    'surfaced': '! Surfaced',
-    'lost': '✕ Lost',
-    'infeasible': '! Infeasible',
-    'aborted': '✕ Aborted',
-    'failed': '✕ Failed',
-}
+#: Marks of what became of a run, by the colour of that word; of others another one.
+_MARKS, _OTHER_MARK = {'green': '✓', 'yellow': '!'}, '✕'
 
 
 def _number(value: float | None, digits: int, unit: str) -> str:
@@ -135,15 +129,15 @@ def _table(columns: dict[str, Callable[[Any], str]], things: Sequence) -> list[l
 
 def report_page(run: FlownRun) -> str:
     """Text of the report of a run."""
-    card, rules = run.card, run.rules
+    card, rules, status = run.card, run.rules, run.card['status']
     return make_page(
         'report.html',
         [run],
         report_panels(run),
-        title=f'{title_of(run.scenario.name, run.scenario.changed)}: {card["status"]}',
+        title=f'{title_of(run.scenario.name, run.scenario.changed)}: {status}',
         scenario=run.scenario,
-        status=card['status'],
-        badge=_BADGES[card['status']],
+        status=status,
+        badge=f'{_MARKS.get(STATUSES[status], _OTHER_MARK)} {status.capitalize()}',
         verdict=verdict(card, rules.settle_s),
         tiles=_tiles(run),
         findings=findings(run),

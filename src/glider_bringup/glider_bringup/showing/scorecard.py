@@ -12,23 +12,12 @@ from rich.console import Console
 from rich.table import Table
 
 from glider_bringup.console import messages, output
-from glider_bringup.scoring.card import STOPPED
+from glider_bringup.scoring.card import STATUSES, STOPPED
 from glider_bringup.scoring.scores import SCORES, Score, reckoned, told_in
 from glider_bringup.showing.words import span, way
 from glider_mission.changes import told_fields
 from glider_mission.chart import place_told
 from glider_model.ocean.current_settings import KNOT_MPS
-
-#: Colours of what became of a run.
-STYLES = {
-    'completed': 'green',
-    'infeasible': 'yellow',
-    'unfinished': 'yellow',
-    'surfaced': 'yellow',
-    'lost': 'bold red',
-    'aborted': 'red',
-    'failed': 'red',
-}
 
 
 def show(value: float | None, unit: str, digits: int = 2) -> str:
@@ -208,7 +197,7 @@ def print_card(card: dict, folder: Path, report: Path | None = None) -> None:
     title = title_of(card['scenario'], card.get('changed', {}))
     table = Table(title=title, show_header=False, title_justify='left')
     for name, text in card_rows(card):
-        table.add_row(name, text, style=STYLES[card['status']] if name == 'status' else None)
+        table.add_row(name, text, style=STATUSES[card['status']] if name == 'status' else None)
     output.print(table)
     print_places(output, folder, report)
 
@@ -216,7 +205,7 @@ def print_card(card: dict, folder: Path, report: Path | None = None) -> None:
 def print_status(card: dict, console: Console = output) -> None:
     """Print what became of a run."""
     text = f'status: {status_text(card)}'
-    console.print(text, style=STYLES[card['status']], soft_wrap=True)
+    console.print(text, style=STATUSES[card['status']], soft_wrap=True)
 
 
 def tell_stopped(card: dict) -> None:
