@@ -27,7 +27,7 @@ from glider_base.ros.lockstep.node import TickSettings
 from glider_base.ros.places import MAX_DOMAIN, NAMESPACE_ALLOWED, domain_id
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.topics import TOPICS
-from glider_base.settings import Settings
+from glider_base.settings import BOUNDS, Settings, limits
 from glider_base.wiring import JOINTS, present
 from glider_bringup.cli import MAX_WORD
 from glider_bringup.engines.launch_plan import ARGUMENTS
@@ -72,7 +72,6 @@ BLOCK_FIELDS = set(BlockSettings.model_fields) - set(TickSettings.model_fields)
 COMMON = set(FaultSettings.model_fields)
 
 PROFILES = ('PER_TICK', 'FREE', 'NEWEST', 'LATCHED', 'EVENTS', 'REPEATED', 'EVERYTHING')
-_SIGNS = (('gt', '>'), ('ge', '>='), ('lt', '<'), ('le', '<='))
 DEADLINE_S = 120.0
 
 
@@ -120,13 +119,7 @@ def allowed(field) -> str:
     """Range of a field, or the words that it can be."""
     if get_origin(field.annotation) is Literal:
         return ', '.join(str(w) for w in get_args(field.annotation) if w not in STRANGERS)
-    limits = [
-        f'{sign} {getattr(item, name)}'
-        for item in field.metadata
-        for name, sign in _SIGNS
-        if getattr(item, name, None) is not None
-    ]
-    return ', '.join(limits)
+    return ', '.join(f'{BOUNDS[name]} {limit}' for name, limit in limits(field).items())
 
 
 def default_of(field, value) -> str:

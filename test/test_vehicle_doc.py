@@ -12,12 +12,12 @@ from typing import get_args
 import pydantic
 import pytest
 
+from glider_base.settings import BOUNDS, limits
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import SURFACES, Vehicle, load_vehicle
 
 DOCUMENT = Path(__file__).resolve().parents[1] / 'docs' / 'vehicle_file.md'
 MARKED = re.compile(r'(<!-- table: ([^>]+) -->\n)(.*?)(<!-- end -->)', re.DOTALL)
-SIGNS = (('gt', '>'), ('ge', '>='), ('lt', '<'), ('le', '<='))
 
 
 def model_of(annotation) -> type[pydantic.BaseModel] | None:
@@ -36,13 +36,8 @@ def is_quantity(model) -> bool:
     return model is not None and 'value' in model.model_fields
 
 
-def limits(field) -> str:
-    return ', '.join(
-        f'{sign} {getattr(item, name):g}'
-        for item in field.metadata
-        for name, sign in SIGNS
-        if getattr(item, name, None) is not None
-    )
+def range_of(field) -> str:
+    return ', '.join(f'{BOUNDS[name]} {limit:g}' for name, limit in limits(field).items())
 
 
 def row(name: str, field) -> tuple[str, ...]:
@@ -50,10 +45,10 @@ def row(name: str, field) -> tuple[str, ...]:
     model, unit, allowed = model_of(field.annotation), '', ''
     if is_quantity(model):
         unit, value = re.search(r'\[(.*)\]$', model.__name__)[1], model.model_fields['value']
-        allowed = limits(value)
+        allowed = range_of(value)
         if value.annotation is not float:
             (one,) = get_args(value.annotation)
-            unit, allowed = f'{unit}, three numbers', limits(one.__metadata__[0])
+            unit, allowed = f'{unit}, three numbers', range_of(one.__metadata__[0])
     return (
         f'`{name}`',
         unit,

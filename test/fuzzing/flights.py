@@ -17,7 +17,7 @@ import pydantic
 
 from fuzzing.counts import Counter
 from fuzzing.watch import outcome_of, time_limit_after
-from glider_base.settings import ConfigurationError
+from glider_base.settings import ConfigurationError, limits
 from glider_bringup.scoring.card import finite, fly_scored, scorecard
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.scenario import Scenario, load_scenario
@@ -68,14 +68,9 @@ def numeric_fields(model: type[pydantic.BaseModel], before: str) -> Iterator[tup
             yield f'{before}{name}', field
 
 
-def limits(field: Any) -> tuple[float, float]:
+def range_of(field: Any) -> tuple[float, float]:
     """Lowest and highest number that a field allows."""
-    allowed = {
-        word: getattr(item, word)
-        for item in field.metadata
-        for word in ('ge', 'gt', 'le', 'lt')
-        if getattr(item, word, None) is not None
-    }
+    allowed = limits(field)
     low, high = allowed.get('ge', allowed.get('gt')), allowed.get('le', allowed.get('lt'))
     near = 1e-6 * (high - low)
     return low + near * ('gt' in allowed), high - near * ('lt' in allowed)
@@ -83,7 +78,7 @@ def limits(field: Any) -> tuple[float, float]:
 
 def _number(draw: np.random.Generator, field: Any) -> float | int:
     """A number that a field allows, likely one of its limits."""
-    low, high = limits(field)
+    low, high = range_of(field)
     if draw.random() < AT_A_LIMIT:
         number = (low, high)[draw.integers(2)]
     elif low > 0.0 and draw.random() < 0.5:

@@ -94,7 +94,7 @@ def positive(default: Any, most: float, words: str, tunable: bool = False) -> An
 
 
 #: Numeric limits as pydantic calls them, and in a person's words.
-_BOUNDS = (('ge', '>='), ('gt', '>'), ('le', '<='), ('lt', '<'))
+BOUNDS = {'ge': '>=', 'gt': '>', 'le': '<=', 'lt': '<'}
 _NOT_A_MAPPING = ('dict_type', 'model_type', 'model_attributes_type')
 
 
@@ -155,15 +155,15 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
         if key in context:
             extra = field.json_schema_extra if field is not None else None
             return f'allowed: {context[key]}' + _others(extra)
-    limits = [f'{word} {context[key]}' for key, word in _BOUNDS if key in context]
-    if field is not None:
-        limits = [
-            f'{word} {getattr(item, key)}'
-            for item in field.metadata
-            for key, word in _BOUNDS
-            if getattr(item, key, None) is not None
-        ] or limits
-    return f'allowed: {" and ".join(limits)}' if limits else ''
+    found = (field is not None and limits(field)) or context
+    told = [f'{word} {found[key]}' for key, word in BOUNDS.items() if key in found]
+    return f'allowed: {" and ".join(told)}' if told else ''
+
+
+def limits(field: pydantic.fields.FieldInfo) -> dict[str, float]:
+    """Numeric limits of a field, by their names in `BOUNDS`."""
+    pairs = ((key, getattr(item, key, None)) for item in field.metadata for key in BOUNDS)
+    return {key: limit for key, limit in pairs if limit is not None}
 
 
 def _others(extra: Any) -> str:

@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 
 from glider_base.errors import shown
 from glider_base.files import read_bytes
+from glider_base.settings import limits
 from glider_base.signals import SEA_WATER_DENSITY
 from glider_guidance.yo.machine import ProfileSettings
 
@@ -291,14 +292,9 @@ def _value(name: str, of: _Of, where: str, value: float) -> float:
     if of.negative and value < 0.0:
         return 0
     field = ProfileSettings.model_fields[of.field]
-    limits = {
-        key: getattr(one, key)
-        for one in field.metadata
-        for key in ('ge', 'gt', 'le')
-        if hasattr(one, key)
-    }
-    low, high = limits.get('ge', limits.get('gt')), limits['le']
-    is_above, is_whole = bool(of.negative) or 'gt' in limits, field.annotation is int
+    found = limits(field)
+    low, high = found.get('ge', found.get('gt')), found['le']
+    is_above, is_whole = bool(of.negative) or 'gt' in found, field.annotation is int
     made = round(value * of.scale, _DECIMALS)
     if not low <= made <= high or (is_above and made == low) or (is_whole and made % 1.0):
         ends = sorted((low / of.scale + 0.0, high / of.scale))  # no -0

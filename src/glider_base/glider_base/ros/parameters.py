@@ -25,9 +25,9 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from glider_base.errors import clipped, shown
+from glider_base.errors import ConfigurationError, clipped, shown
 from glider_base.files import parse_json, parse_yaml
-from glider_base.settings import ConfigurationError, Settings, holder_of, mistakes, validate
+from glider_base.settings import Settings, holder_of, limits, mistakes, validate
 
 SettingsT = TypeVar('SettingsT', bound=Settings)
 
@@ -65,12 +65,9 @@ class _Leaf(NamedTuple):
     @property
     def limits(self) -> tuple | None:
         """Smallest and largest value of a number; None if everything is allowed."""
-        found, largest = {}, _LARGEST.get(self.kind)
-        for item in self.field.metadata if largest else ():
-            for key in ('ge', 'gt', 'le', 'lt'):
-                limit = getattr(item, key, None)
-                if limit is not None:
-                    found[key[0]] = self.kind(limit)
+        largest = _LARGEST.get(self.kind)
+        told = limits(self.field) if largest else {}
+        found = {key[0]: self.kind(limit) for key, limit in told.items()}
         return (found.get('g', -largest), found.get('l', largest)) if found else None
 
 
