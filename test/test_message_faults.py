@@ -156,7 +156,7 @@ def test_free_running_it_flies_on(glider, tmp_path):
     commands[AUTOPILOT] += ['-p', 'guard_node:lost_after_s:=60.0']
     with ThreadPoolExecutor(1) as pool:
         interrupted = pool.submit(interrupt, folder)
-        result = run_nodes(commands, tmp_path / 'nodes.log', on_log=lambda line: None)
+        result = run_nodes(commands, tmp_path / 'nodes.log', lambda line: None)
     assert interrupted.result()
     assert result.status == 'completed', result.reason
     (bag,) = folder.glob('*.mcap')

@@ -229,7 +229,6 @@ def flown_by(
         name: [sys.executable, *program(name, module), *ros]
         for name, (_, _, module, *ros) in commands.items()
     }
-    result = run_nodes(commands, folder / 'log.txt')
+    result = run_nodes(commands, folder / 'log.txt', print)
     assert (result.status, result.reason) == ('completed', '')
-    assert result.progress['lost'] == 0
     return digests(folder)

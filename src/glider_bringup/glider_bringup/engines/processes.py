@@ -62,10 +62,8 @@ class RunnerResult(NamedTuple):
 
     status: str  #: 'completed', 'aborted' (by a signal to the runner) or 'failed'
     reason: str = ''  #: one or more sentences for the person
-    culprit: str = ''  #: node that failed
-    exit_code: int = 0  #: of the culprit; negative: the signal that killed it
+    exit_code: int = 0  #: of the node that failed; negative: the signal that killed it
     flight_s: float = 0.0  #: wall time from the first tick to the end
-    progress: Mapping[str, Any] = {}  #: last word of the recorder
 
 
 def process_modules(layout: Layout = 'processes') -> dict[str, str]:
@@ -265,16 +263,10 @@ class _Run:
             if not ended:
                 continue
             self.pump(0.0)
-            if not self._is_complete():
+            if not self.progress.get('complete'):
                 return 'failed', self._culprit()
             self._wait_for(self.processes.values(), _LEAVE_S)
             return 'completed', None
-
-    def _is_complete(self) -> bool:
-        """Whether the run has come to its end, by the word of the recorder if there is one."""
-        if RECORDER in self.processes:
-            return bool(self.progress.get('complete'))
-        return all(p.code == 0 for p in self.processes.values() if p.name in _MAKES_TIME)
 
     def _culprit(self) -> _Process:
         """Of the dead, the one that did not merely notice that another one was ill.
@@ -331,16 +323,11 @@ class _Run:
         self._janitor.finish()
 
 
-def _print_log(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
-
-
 def run_nodes(
     commands: Mapping[str, Sequence[str]],
     log_file: Path,
-    *,
+    on_log: Callable[[str], None],
     on_progress: Callable[[dict[str, Any]], None] | None = None,
-    on_log: Callable[[str], None] = _print_log,
 ) -> RunnerResult:
     """Start the nodes, wait for the end of the run, stop them all.
 
@@ -350,11 +337,11 @@ def run_nodes(
         Command line by node name, as of `node_commands`.
     log_file : Path
         Gets every line that a node prints, with the node's name in front.
+    on_log : callable
+        Gets the lines that also go to ``log_file``.
     on_progress : callable, optional
         Gets what the recorder says several times a second: tick, t_s, depth_m, stage, messages,
         lost; in the last one also complete, and counts by topic.
-    on_log : callable
-        Gets the lines that also go to ``log_file``.
 
     Returns
     -------
@@ -375,27 +362,13 @@ def run_nodes(
                 status, culprit = run.watch()
             finally:
                 run.stop()
-        return _result(run, status, culprit)
-
-
-def _result(run: _Run, status: str, culprit: _Process | None) -> RunnerResult:
-    now = time.monotonic()
-    reason, name, code = '', '', 0
-    if status == 'aborted':
-        reason = f'stopped by {signal.Signals(run.signal).name}'
-    if culprit is not None:
-        reason, name, code = culprit.epitaph(), culprit.name, culprit.code
-        if code == 3:
-            named = [other for other in run.processes if other in reason]
-            name = min(named, key=reason.index, default=name)
-    return RunnerResult(
-        status=status,
-        reason=reason,
-        culprit=name,
-        exit_code=code,
-        flight_s=now - (run.first_tick_s or now),
-        progress=run.progress,
-    )
+        now, reason = time.monotonic(), ''
+        if status == 'aborted':
+            reason = f'stopped by {signal.Signals(run.signal).name}'
+        if culprit is not None:
+            reason = culprit.epitaph()
+        flight_s = now - (run.first_tick_s or now)
+        return RunnerResult(status, reason, culprit.code if culprit else 0, flight_s)
 
 
 @contextmanager

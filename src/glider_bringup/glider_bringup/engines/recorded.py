@@ -94,8 +94,8 @@ def fly_nodes(
     result = run_nodes(
         node_commands(folder / PARAMETERS_FILE, place, namespace is not None, layout),
         folder / LOG_FILE,
-        on_progress=progress and (lambda said: progress(said['tick'], said['depth_m'])),
-        on_log=on_log,
+        on_log,
+        progress and (lambda said: progress(said['tick'], said['depth_m'])),
     )
     if result.exit_code == EXIT_USAGE:
         raise ConfigurationError(result.reason)
