@@ -99,6 +99,13 @@ _TRACK = Panel(
     'bold.',
     kind='track',
 )
+_PLACES = Panel(
+    'places',
+    'Where it surfaced, around its estimated position',
+    'From above, each to its own scale, in metres east and north of the estimate before the first '
+    'fix. Of many surfacings those that were farthest off.',
+    kind='places',
+)
 _ROLES = ('measured', 'reference', 'third', 'fourth')
 
 
@@ -178,21 +185,6 @@ def _flight_panels(run: FlownRun) -> list[Panel]:
             'own, so there is no reference.',
             curves('roll_deg'),
         ),
-    ]
-
-
-def _surfacing_panels(run: FlownRun) -> list[Panel]:
-    """Where it came up, around where it believed to be; nothing without a surfacing."""
-    if not (reckoned(run.card) or {}).get('reports'):
-        return []
-    return [
-        Panel(
-            'places',
-            'Where it surfaced, around its estimated position',
-            'From above, each to its own scale, in metres east and north of the estimate '
-            'before the first fix. Of many surfacings those that were farthest off.',
-            kind='places',
-        )
     ]
 
 
@@ -310,7 +302,7 @@ def report_panels(run: FlownRun) -> dict[str, list[Panel]]:
     if not run.traces.ticks:
         return {}
     groups = {
-        'Each surfacing': _surfacing_panels(run),
+        'Each surfacing': [_PLACES] if (reckoned(run.card) or {}).get('reports') else [],
         'Where it went': [_TRACK, SPACE],
         'How it knew where it was': _navigation_panels(run),
         'How it flew': _flight_panels(run),

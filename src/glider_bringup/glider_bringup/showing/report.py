@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from glider_base.files import yaml_text
-from glider_base.frames import to_geodetic
+from glider_base.frames import Origin, to_geodetic
 from glider_base.signals import TICK_S
 from glider_bringup.scoring.card import STATUSES
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.scoring.traces import Dive, dives_of
 from glider_bringup.showing.findings import findings, verdict
 from glider_bringup.showing.panels import report_panels
-from glider_bringup.showing.scorecard import card_rows, title_of
+from glider_bringup.showing.scorecard import card_rows, show, title_of
 from glider_bringup.showing.web_page import FlownRun, make_page
 from glider_bringup.showing.words import count, span, way
 from glider_mission.chart import place_told
@@ -26,7 +26,7 @@ _MARKS, _OTHER_MARK = {'green': '✓', 'yellow': '!'}, '✕'
 
 def _number(value: float | None, digits: int, unit: str) -> str:
     """Number and unit that stay on one line."""
-    return '-' if value is None else f'{value:,.{digits}f}\N{NO-BREAK SPACE}{unit}'
+    return show(value, unit, digits).replace(' ', '\N{NO-BREAK SPACE}')
 
 
 def _tiles(run: FlownRun) -> list[tuple[str, str, str]]:
@@ -78,15 +78,8 @@ def _knots(values: list[float] | None) -> list[float] | None:
     return values and [value / KNOT_MPS for value in values]
 
 
-#: Positions at a surfacing: the word for each, and its name in the scorecard.
-_PLACES = {'estimated': 'believed', 'true': 'true'}
-#: Columns of the tables of surfacings and of dives: head, and text of a line.
+#: Columns of the tables of surfacings, after time and places, and of dives: head, and line's text.
 _SURFACING: dict[str, Callable[[dict], str]] = {
-    'time': lambda one: span(one['t_s']),
-    **{
-        f'{word} place, N / E (m)': lambda one, name=name: _pair(one[f'{name}_ned_m'], 0)
-        for word, name in _PLACES.items()
-    },
     'error (m)': lambda one: f'{one["error_m"]:,.1f}',
     'in the 95 % ellipse': lambda one: {True: 'yes', False: 'no', None: '-'}[one['inside_95']],
     'off the path (m)': lambda one: f'{one["cross_track_m"]:+,.1f}',
@@ -106,18 +99,19 @@ _DIVE: dict[str, Callable[[Dive], str]] = {
 }
 
 
-def _surfacing(run: FlownRun) -> dict[str, Callable[[dict], str]]:
+def _surfacing(origin: Origin | None) -> dict[str, Callable[[dict], str]]:
     """Columns of the table of surfacings, with places in degrees if there is a chart."""
-    origin = run.rules.origin
-    if origin is None:
-        return _SURFACING
+    unit = ', N / E (m)' if origin is None else ''
 
-    def in_degrees(name: str) -> Callable[[dict], str]:
-        return lambda one: place_told(*to_geodetic(*one[f'{name}_ned_m'], origin))
+    def place(ned_m: list[float]) -> str:
+        return place_told(*to_geodetic(*ned_m, origin)) if origin else _pair(ned_m, 0)
 
-    places = {f'{word} place': in_degrees(name) for word, name in _PLACES.items()}
-    rest = {name: text for name, text in _SURFACING.items() if ' place, ' not in name}
-    return {'time': rest.pop('time'), **places, **rest}
+    return {
+        'time': lambda one: span(one['t_s']),
+        f'estimated place{unit}': lambda one: place(one['believed_ned_m']),
+        f'true place{unit}': lambda one: place(one['true_ned_m']),
+        **_SURFACING,
+    }
 
 
 def _table(columns: dict[str, Callable[[Any], str]], things: Sequence) -> list[list[str]]:
@@ -141,7 +135,7 @@ def report_page(run: FlownRun) -> str:
         verdict=verdict(card, rules.settle_s),
         tiles=_tiles(run),
         findings=findings(run),
-        surfacings=_table(_surfacing(run), (reckoned(card) or {}).get('reports', [])),
+        surfacings=_table(_surfacing(rules.origin), (reckoned(card) or {}).get('reports', [])),
         dives=_table(_DIVE, dives_of(run.traces) if run.traces.ticks else []),
         card=card_rows(card),
         settle=span(rules.settle_s),
