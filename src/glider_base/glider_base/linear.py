@@ -10,17 +10,9 @@ import numpy as np
 
 
 def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solution x of matrix x = right, by elimination with partial pivoting.
+    """Solution x, float64[n, m], of matrix x = right, by elimination with partial pivoting.
 
-    Parameters
-    ----------
-    matrix : float64[n, n]
-        Not singular.
-    right : float64[n, m]
-
-    Returns
-    -------
-    float64[n, m]
+    The matrix, float64[n, n], is not singular.
     """
     n = len(matrix)
     rows = np.hstack((matrix, right))

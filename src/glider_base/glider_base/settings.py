@@ -116,16 +116,10 @@ def _has_tag(model: type[pydantic.BaseModel], tag: str) -> bool:
 
 
 def _follow(model: type[pydantic.BaseModel], location: tuple):
-    """Follow the location of an error.
+    """Follow the location of an error, to which pydantic adds the names of union members.
 
-    Returns
-    -------
-    path : list of str
-        The location as the person wrote it: pydantic's adds the names of union members.
-    holders : list of type
-        Models that may hold the last part.
-    field : FieldInfo or None
-        The last part, if it is a field.
+    Gives the location as the person wrote it, the models that may hold its last part, and the
+    field that this is; None if it is none.
     """
     path, holders, inside, field = [], [model], [model], None
     for part in location:
@@ -263,25 +257,11 @@ def validate(
     line_of: Callable[[tuple[str, ...]], int | None] = lambda location: None,
     changed: str = '',
 ) -> SettingsT:
-    """Validate ``values`` as ``model``.
+    """Validate ``values``, which come from the file or option ``source``, as ``model``.
 
-    Parameters
-    ----------
-    model : type of Settings
-    values
-    source : str
-        File or option that they come from.
-    folder : Path, optional
-        Where files that they name are looked for.
-    line_of : callable, optional
-        Line of the file in which a value stands, by its location; None if it has none.
-    changed : str
-        What was changed since the file was read, in words.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming ``source``, the line, the field, its value and the allowed range.
+    Files that they name are looked for in ``folder``. ``line_of`` tells by the location of a value
+    in which line of the file it stands, if in any; ``changed`` in words what was changed since it
+    was read. A ConfigurationError names source, line, field, its value and the allowed range.
     """
     _refuse_flags_for_numbers(model, values, f'{source}{changed}')
     try:

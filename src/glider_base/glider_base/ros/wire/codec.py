@@ -224,15 +224,9 @@ class Codec:
     def decode_many(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Stamps and numbers of n serialized messages uint8[n, size] at once.
 
-        Returns
-        -------
-        stamps : int64[n]
-            In ns.
-        values : float64[n, m]
-            NaN and infinities included.
-        own : bool[n]
-            Whether all other bytes are those that `encode_many` writes, or once wrote: then, and
-            only then, stamp and numbers are the whole message. Else they may be anything.
+        Stamps int64[n] are in ns; numbers float64[n, m] may be NaN or infinite. The last, bool[n],
+        is whether all other bytes are those that `encode_many` writes, or once wrote: then, and
+        only then, stamp and numbers are the whole message. Else they may be anything.
         """
         rest = rows & self._mask
         own = np.all(rest == self._template, axis=1) | np.all(rest == self._before, axis=1)
