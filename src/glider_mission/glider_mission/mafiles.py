@@ -249,17 +249,9 @@ def _degrees(value: float) -> float:
 
 
 def read_profile(files: Any) -> dict[str, float | str | None]:
-    """Fields of a profile that a yo file, a surfacing file or both say.
+    """Fields of a profile that a yo file, a surfacing file or both say, by their path or paths.
 
-    Parameters
-    ----------
-    files : str or list of str
-        Their paths.
-
-    Raises
-    ------
-    ValueError
-        Naming file, line, argument, value and what is allowed.
+    A ValueError names file, line, argument, value and what is allowed.
     """
     paths = [files] if isinstance(files, str) else files
     is_list = isinstance(paths, list | tuple) and all(isinstance(path, str) for path in paths)

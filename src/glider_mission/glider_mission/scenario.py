@@ -508,21 +508,11 @@ def make_scenario(
 ) -> Scenario:
     """Scenario of a file with some of its fields changed.
 
-    Parameters
-    ----------
-    source : ScenarioSource
-    changes : dict
-        Values by dotted field name, such as ``{'current.speed_kn': 0.5}``. Names that begin with
-        ``vehicle.`` are fields of the vehicle's file.
-    recorded : bool
-        It has been flown: nobody asks any more whether the vehicle is rated for its depth.
-    kind : type of Scenario, optional
-        That of its law; by default the last one that this program brought by that name.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming file, field, value and allowed range.
+    Changes are values by dotted field name, such as ``{'current.speed_kn': 0.5}``; names that
+    begin with ``vehicle.`` are fields of the vehicle's file. Of one that is ``recorded`` nobody
+    asks any more whether the vehicle is rated for its depth. Its ``kind`` is that of its law, by
+    default the last one that this program brought by that name. A ConfigurationError names file,
+    field, value and allowed range.
     """
     path, values, changes = source.path, deepcopy(source.values), plain(changes or {})
     own, in_vehicle = split_changes(changes)

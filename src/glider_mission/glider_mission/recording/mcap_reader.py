@@ -208,32 +208,16 @@ class _File:
 
 
 class Bag:
-    """What is recorded in a bag.
+    """What is recorded in a bag: folder of a run or of rosbag2, also split, or one MCAP file.
 
-    Parameters
-    ----------
-    path : Path
-        Folder of a run or of a rosbag2 bag, also of a split one, or a single MCAP file.
-
-    Attributes
-    ----------
-    topics : list of BagTopic
-    attachments : dict of bytes
-        By name.
-    cut : str
-        Empty, or a sentence that says where a file ends early, and how far it goes.
-
-    Raises
-    ------
-    ConfigurationError
-        Naming the file, and the chunk if one is damaged.
+    A ConfigurationError names the file, and the chunk if one is damaged.
     """
 
     def __init__(self, path: Path) -> None:
         self.files = bag_files(Path(path))
         self._read = [_File(file, number) for number, file in enumerate(self.files)]
-        self.attachments: dict[str, bytes] = {}
-        self.cut = ''
+        self.attachments: dict[str, bytes] = {}  #: by name
+        self.cut = ''  #: or a sentence that says where a file ends early, and how far it goes
         topics: dict[str, BagTopic] = {}
         for file in self._read:
             self.attachments = file.attachments | self.attachments

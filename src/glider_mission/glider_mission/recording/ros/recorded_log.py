@@ -100,35 +100,17 @@ def decode(codec: Codec, batch: Batch, chosen: np.ndarray) -> Decoded:
 class RecordedLog:
     """A bag as the log rows that the direct engine would have given, and what else it tells.
 
-    Parameters
-    ----------
-    bag : Bag
-    also : iterable of str
-        Topics to read beside `SCORED`, NaN in ticks that lack them. The columns of all other
-        topics are NaN.
-    steers_by : str
-        Name of the vehicle's steering surface; empty without.
-
-    Raises
-    ------
-    ConfigurationError
-        If the bag holds several gliders.
-
-    Attributes
-    ----------
-    ticks : int
-        Rows given so far.
-    counts : Counter
-        Messages by topic, known when all `blocks` are taken, as is what follows.
-    end : health.Report or None
-        What the plant said about the end of the run.
+    Topics that are ``also`` read beside `SCORED` are NaN in ticks that lack them, the columns of
+    all others in every tick. ``steers_by`` names the vehicle's steering surface; empty without.
+    What it counts and the end are known when all `blocks` are taken. Raises ConfigurationError if
+    the bag holds several gliders.
     """
 
     def __init__(self, bag: Bag, also: Iterable[str] = (), steers_by: str = '') -> None:
         self._bag = bag
-        self.ticks = 0
-        self.counts: Counter[str] = Counter()
-        self.end: health.Report | None = None
+        self.ticks = 0  #: rows given so far
+        self.counts: Counter[str] = Counter()  #: messages by topic
+        self.end: health.Report | None = None  #: what the plant said about the end of the run
         found = namespaces(bag)
         if len(found) > 1:
             raise ConfigurationError(

@@ -23,22 +23,14 @@ _KEPT = 1000
 class Series:
     """All messages of one per-tick topic, in the order of their log times.
 
-    Attributes
-    ----------
-    stamps_ns : int64[n]
-    values : float64[n, m]
-    own : bool[n]
-        Whether stamp and numbers are the whole message, byte by byte.
-    raw : dict of bytes
-        Messages that are not, by index; the first thousand of them.
-    unusable : dict of str
-        Why a node would refuse a message, by index.
+    Once it is closed it has ``stamps_ns`` int64[n], ``values`` float64[n, m], and ``own`` bool[n]:
+    whether stamp and numbers are the whole message, byte by byte.
     """
 
     def __init__(self, codec: Codec) -> None:
         self.codec = codec
-        self.raw: dict[int, bytes] = {}
-        self.unusable: dict[int, str] = {}
+        self.raw: dict[int, bytes] = {}  #: messages that are not, by index; the first thousand
+        self.unusable: dict[int, str] = {}  #: why a node would refuse a message, by index
         self._blocks: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self._count = 0
 

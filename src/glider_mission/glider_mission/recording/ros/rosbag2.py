@@ -85,26 +85,13 @@ def qos_yaml(qos: QoSProfile) -> str:
 class BagWriter:
     """Writes ``<folder>/<name>_0.mcap`` and, when closed, ``<folder>/metadata.yaml``.
 
-    Parameters
-    ----------
-    folder : Path
-        Made if it is missing.
-    name : str
-    names : mapping, optional
-        Absolute names by topic; else those that the topics have in the namespace `/glider`.
-    attachments : iterable of Path
-        Files stored in the MCAP under their own names.
-    topics : iterable of Topic
-        In the order in which a tick is written; names given to `write` are theirs.
-    sync : str
-        When the file is synced to disk; what was flushed only is safe from a kill of this process,
-        what was synced from a loss of power as well.
-
-    Raises
-    ------
-    OSError
-        If a recording is there already, or the file cannot be made. All methods that write raise
-        a `DiskError` if the disk takes no more, or the file is no longer there.
+    The folder is made if it is missing. ``topics`` are in the order in which a tick is written;
+    names given to `write` are theirs. ``names`` are absolute, by topic; without them those in the
+    namespace `/glider`. ``attachments`` are files that are stored under their own names. ``sync``
+    says when the file is synced to disk: what was flushed only is safe from a kill of this
+    process, what was synced from a loss of power as well. Raises OSError if a recording is there
+    already, or the file cannot be made. All methods that write raise a `DiskError` if the disk
+    takes no more, or the file is no longer there.
     """
 
     def __init__(
