@@ -367,22 +367,11 @@ def numbers_of(row: np.ndarray, scenario: Scenario) -> dict[str, Any]:
 
 
 def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> xarray.Dataset:
-    """Dataset of a run.
+    """Dataset of a run, by its scorecard and every tick of it, float64[n, ROW], as on the wire.
 
-    Parameters
-    ----------
-    log : float64[n, ROW]
-        Every tick of the run, as on the wire; NaN in columns of topics that were not recorded.
-    scenario : Scenario
-    score : dict
-        Its scorecard.
-
-    Returns
-    -------
-    xarray.Dataset
-        One-dimensional variables over ``time`` (s), each with ``units``, ``long_name``, ``topic``
-        and, if it has one, ``frame``. Those of sensors and beliefs that navigation does not have
-        are not there.
+    Columns of topics that were not recorded are NaN. The variables are one-dimensional over
+    ``time`` (s), each with ``units``, ``long_name``, ``topic`` and, if it has one, ``frame``.
+    Those of sensors and beliefs that navigation does not have are not there.
     """
     time_s = np.arange(len(log)) * TICK_NS / 1e9
     about = ('scenario', 'vehicle', 'controller', 'guidance', 'seed', 'status')

@@ -20,28 +20,12 @@ _READY = 'ready '
 
 @contextmanager
 def live_view(port: int, namespace: str | None = None) -> Iterator[tuple[str, Callable[[], None]]]:
-    """Serve a run that is about to fly.
+    """Serve a run that is about to fly; everything that is started inside shares its ROS domain.
 
-    Everything that is started inside shares its ROS domain.
-
-    Parameters
-    ----------
-    port : int
-    namespace : str, optional
-        Of the nodes, whose clock is then in it too.
-
-    Yields
-    ------
-    str
-        Address that opens the view in Foxglove.
-    callable
-        To be called once the run has begun: it subscribes only then, so that nobody takes it for
-        one of the peers that they wait for.
-
-    Raises
-    ------
-    ConfigurationError
-        If the port cannot be used, or the server is not installed.
+    Nodes in a namespace have their clock in it too. Yields the address that opens the view in
+    Foxglove, and what is to be called once the run has begun: it subscribes only then, so that
+    nobody takes it for one of the peers that they wait for. Raises ConfigurationError if the port
+    cannot be used, or the server is not installed.
     """
     with domain_id() as domain, _in_domain(domain):
         ros = ['--ros-args', '-r', f'__ns:={namespace or NAMESPACE}']

@@ -28,18 +28,9 @@ def node_parameters(
 ) -> dict[str, dict]:
     """Nested parameters of every node, by node name.
 
-    Parameters
-    ----------
-    speed : float
-        Times real time; 0.0: as fast as possible.
-    navigates : bool
-        Whether there is a navigation node. Without it nobody publishes what it alone reads.
-    record_to : Path, optional
-        Folder of the recording. Without it a recorder is started by hand, if any.
-    attachments : iterable of Path
-        Files to store in the recording.
-    sync : str
-        When the recording is synced to disk; see `recorder_node.RecorderSettings`.
+    The speed is times real time, 0.0 as fast as possible. If no node ``navigates``, nobody
+    publishes what it alone reads. Without a folder to record to, a recorder is started by hand, if
+    any; of ``attachments`` and ``sync`` see `recorder_node.RecorderSettings`.
     """
     common = {'lockstep': lockstep, 'record': record_to is not None}
     nodes = {

@@ -331,22 +331,11 @@ def run_nodes(
 ) -> RunnerResult:
     """Start the nodes, wait for the end of the run, stop them all.
 
-    Parameters
-    ----------
-    commands : mapping
-        Command line by node name, as of `node_commands`.
-    log_file : Path
-        Gets every line that a node prints, with the node's name in front.
-    on_log : callable
-        Gets the lines that also go to ``log_file``.
-    on_progress : callable, optional
-        Gets what the recorder says several times a second: tick, t_s, depth_m, stage, messages,
-        lost; in the last one also complete, and counts by topic.
-
-    Returns
-    -------
-    RunnerResult
-        No process is left when it comes back. SIGINT and SIGTERM to this process abort the run.
+    Commands are by node name, as of `node_commands`. ``log_file`` and ``on_log`` get every line
+    that a node prints, with its name in front; ``on_progress`` what the recorder says several
+    times a second: tick, t_s, depth_m, stage, messages, lost; in the last one also complete, and
+    counts by topic. No process is left when it comes back. SIGINT and SIGTERM to this process
+    abort the run.
     """
     with domain_id() as domain, log_file.open('wb', buffering=0) as log:
 

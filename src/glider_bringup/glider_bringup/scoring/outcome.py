@@ -59,18 +59,9 @@ def outcome_of(
 ) -> tuple[str, str]:
     """What became of a vehicle: its status, and the reason, empty where there is nothing to say.
 
-    Parameters
-    ----------
-    depth : float64[ticks]
-        True one (m).
-    told : int64[ticks]
-        Rows of the guard; see `as_told`.
-    hull : tuple of 2 float
-        Depth that it is rated for, and at which it gives way (m); infinite if nobody knows.
-    infeasible : bool
-        The course could not be held.
-    missing : str
-        What of its mission it has not flown in its time; empty: nothing.
+    By its true depth (m), float64[ticks], what the guard ``told``, int64[ticks] (see `as_told`),
+    the depths that its hull is rated for and at which it gives way (m, infinite if nobody knows),
+    whether the course could not be held, and what of its mission it has not flown in its time.
     """
     if not len(depth):
         return COMPLETED, ''

@@ -119,14 +119,9 @@ def _take_off_noise(log, first_tick, readings):
 class Scorer:
     """Collects log blocks, then gives the score.
 
-    Parameters
-    ----------
-    scenario : Scenario, optional
-        What is flown; without one there are no faults, no bottom, no noise of where actuators
-        say that they are, and the vehicle knows its place.
-    vehicle : Vehicle, optional
-        Its steering surface, battery, crush depth and drop weight, if there is no scenario;
-        without it there are none.
+    Without a scenario there are no faults, no bottom, no noise of where actuators say that they
+    are, and the vehicle knows its place; without a ``vehicle`` either, no steering surface,
+    battery, crush depth and drop weight.
     """
 
     def __init__(
