@@ -36,7 +36,7 @@ def scores(
     log[:, reference + 1], log[:, reference + 3] = target, 1.0
     log[:, COLUMNS['tracking_error'].start + 1] = e2
     log[:, COLUMNS['guard']] = guard
-    scorer = Scorer(vehicle=load_vehicle(vehicle))
+    scorer = Scorer(load_scenario(changes={'vehicle': vehicle}, recorded=True))
     scorer.add(log)
     return scorer.result(rules or Rules(0.0, 1000.0))
 
@@ -252,7 +252,7 @@ def scorer_with(depth, infeasible):
     log[:, BELIEF] = log[:, TRUTH.start : TRUTH.start + 13]
     log[:, COLUMNS['reference'].start + 3] = 1.0
     log[:, COLUMNS['infeasible']] = infeasible
-    scorer = Scorer(vehicle=load_vehicle('zhang2021'))
+    scorer = Scorer(load_scenario())
     scorer.add(log)
     return scorer.result(Rules(0.0, 1000.0))
 

@@ -35,7 +35,6 @@ from glider_mission.run_folder import (
     REPORT_FILE,
     SCENARIO_FILE,
     TRACES_FILE,
-    VEHICLE_FILE,
     run_folder,
     scenario_of,
     write_scenario,
@@ -128,9 +127,8 @@ class Run:
         else:
             tracer = make_tracer(self.scenario)
             tracer.add(self._rows())
-            text = self.scenario.to_yaml(vehicle=VEHICLE_FILE)
             name = Path(self.scenario.name)
-            flown = flown_run(name, self.scenario, text, self.score, tracer.result())
+            flown = flown_run(name, self.scenario, self.score, tracer.result())
         write_whole(file, report_page(flown))
         return file
 

@@ -57,7 +57,6 @@ class Record:
         self.descending = log[:, COLUMNS['reference']][:, 9] < 0.0
         self.joints = log[:, COLUMNS['joint_states']]
         self.current = log[:, COLUMNS['current_velocity']]
-        self.estimate = log[:, COLUMNS['current_estimate']]
 
     def thinned(self, points: int) -> 'Record':
         """The same with about so many points."""

@@ -54,7 +54,7 @@ from glider_mission.scenario import Scenario
 from glider_model.ocean.bottom import NO_BOTTOM
 from glider_model.plant.plant import DIVED_M, NO_DIVES, dive_m, dives_after
 from glider_model.plant.readings import make_readings, noise_of_readings
-from glider_model.vehicle.file import Vehicle, load_vehicle
+from glider_model.vehicle.file import load_vehicle
 
 #: Heading fluctuation is about the mean over this time (s).
 HEADING_MEAN_S = 300.0
@@ -120,14 +120,12 @@ class Scorer:
     """Collects log blocks, then gives the score.
 
     Without a scenario there are no faults, no bottom, no noise of where actuators say that they
-    are, and the vehicle knows its place; without a ``vehicle`` either, no steering surface,
-    battery, crush depth and drop weight.
+    are, the vehicle knows its place, and it has no steering surface, battery, crush depth and drop
+    weight.
     """
 
-    def __init__(
-        self, scenario: Scenario | None = None, *, vehicle: Vehicle | None = None
-    ) -> None:
-        faults, bottom, origin = (), NO_BOTTOM, OriginSettings()
+    def __init__(self, scenario: Scenario | None = None) -> None:
+        vehicle, faults, bottom, origin = None, (), NO_BOTTOM, OriginSettings()
         self._waiting = list(scenario.orders) if scenario else []
         self._followed: list[Order] = []  #: orders that held
         self._path_since = 0  #: tick from which the last path is followed

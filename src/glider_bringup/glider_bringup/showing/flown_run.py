@@ -14,9 +14,9 @@ from glider_guidance.settings import OLD_NAMES
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.run_folder import (
-    SCENARIO_FILE,
     SCORE_FILE,
     TRACES_FILE,
+    VEHICLE_FILE,
     scenario_of,
 )
 from glider_mission.scenario import Scenario
@@ -55,7 +55,7 @@ def read_run(
 
             card = score_bag(run, bag, scenario, card, progress, [tracer] if tracer else [])
             traces = tracer.result() if tracer else None
-        return flown_run(run, scenario, found.text, card, traces)
+        return flown_run(run, scenario, card, traces, found.text)
 
 
 def _refuse_another(card: dict, scenario: Scenario, source: str) -> None:
@@ -77,9 +77,10 @@ def _refuse_another(card: dict, scenario: Scenario, source: str) -> None:
 
 
 def flown_run(
-    run: Path, scenario: Scenario, as_flown: str, card: dict, traces: Traces | None
+    run: Path, scenario: Scenario, card: dict, traces: Traces | None, as_flown: str = ''
 ) -> FlownRun:
-    """A run with its name and vehicle."""
+    """A run with its name and vehicle, and the text of its scenario as it stands in its folder."""
+    as_flown = as_flown or scenario.to_yaml(vehicle=VEHICLE_FILE)
     vehicle = load_vehicle(scenario.vehicle)
     rules = scenario.score_rules(card['sim_time_s'])
     return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules)
@@ -92,5 +93,4 @@ def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) ->
     """
     traces = tracer.result()
     traces.save(folder / TRACES_FILE)
-    as_flown = (folder / SCENARIO_FILE).read_text(encoding='utf-8')
-    return flown_run(folder, scenario, as_flown, card, traces)
+    return flown_run(folder, scenario, card, traces)
