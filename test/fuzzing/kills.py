@@ -28,8 +28,9 @@ from fuzzing.counts import HANG_S, Counter
 from fuzzing.flight_listener import Heard, flight_heard
 from glider_base.ros.places import NAMESPACE, domain_id
 from glider_base.signals import TICK_NS, TICK_S
+from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 from glider_bringup.engines.janitor import is_alive, left_over, mapped
-from glider_bringup.engines.processes import MODULES, nodes_of
+from glider_bringup.engines.processes import MODULES
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recover import recover
 from glider_mission.recording.ros.recorded_log import RecordedLog, read_back
@@ -40,7 +41,7 @@ SCENARIO = 'current_8deg'
 #: of it seconds late, and it is not to be over by then.
 KILLED_BY, TICKS = 2000, 100_000
 PARENT, ALL = 'parent', 'all at once'
-VICTIMS = (*MODULES, PARENT, ALL)
+VICTIMS = (*MODULES, FORK_SERVER, PARENT, ALL)
 #: Nodes of a flight tick within this time (s).
 _START_S = 120.0
 
@@ -50,7 +51,7 @@ class _Flight(NamedTuple):
 
     parent: subprocess.Popen
     folder: Path
-    pids: dict[str, int]  #: of the nodes
+    pids: dict[str, int]  #: of the nodes, and of what has started them
 
 
 def fuzz(seed: int, count: int, counter: Counter) -> None:
@@ -73,7 +74,7 @@ def _case(victim: str, tick: int, folder: Path, domain: int) -> tuple[str, str]:
             return 'hangs', f'tick {heard.tick} after {_START_S:g} s'
         flight = _Flight(parent, folder, nodes_of(parent.pid))
         segments = set().union(*map(mapped, flight.pids.values()))
-        if not {*MODULES} <= set(flight.pids):
+        if not {*MODULES, FORK_SERVER} <= set(flight.pids):
             return 'wrong', f'it was over at tick {heard.tick}, before the kill'
         for pid in _victims(flight, victim):
             with suppress(ProcessLookupError):  # who goes with its parent may be gone

@@ -54,7 +54,7 @@ time.sleep(600)
 
 
 def test_killed_flights_end_named_and_every_acknowledged_tick_can_be_read(monkeypatch):
-    monkeypatch.setattr(kills, 'VICTIMS', ('guidance_node', 'recorder_node', kills.ALL))
+    monkeypatch.setattr(kills, 'VICTIMS', ('fork_server', 'recorder_node', kills.ALL))
     monkeypatch.setattr(kills, 'KILLED_BY', 500)
     counter = Counter(lambda tried: None)
     kills.fuzz(7, 3, counter)

@@ -200,13 +200,13 @@ def test_signal_while_the_nodes_are_started_leaves_none(fly, monkeypatch, number
         def __init__(self, *arguments, **options):
             super().__init__(*arguments, **options)
             started.append(self)
-            if len(started) == 2:  # the janitor, and the first node
+            if len(started) == 2:  # the janitor, and the fork server
                 os.kill(os.getpid(), number)
 
     monkeypatch.setattr(processes.subprocess, 'Popen', Starting)
     result, _ = fly({'guidance_node': node(), RECORDER: recorder(), PLANT: node()})
     assert (result.status, result.reason) == ('aborted', f'stopped by {number.name}')
-    assert len(started) == 4
+    assert len(started) == 2
     assert not [process.pid for process in started if is_alive(process.pid)]
 
 
@@ -259,6 +259,13 @@ def test_nodes_share_a_domain_that_no_other_run_has(monkeypatch, fly):
     assert len(domains) == 1
     assert domains != {str(taken)}
     assert 1 <= int(domains.pop()) <= 101
+
+
+def test_ps_shows_which_node_is_which(fly):
+    read = "print('line', open('/proc/self/cmdline').read().partition(chr(0))[0], flush=True)"
+    commands = {PLANT: [sys.executable, '-m', 'timeit', '-n', '1', '-r', '1', read]}
+    _, lines = fly(commands)
+    assert f'[{PLANT}] line {PLANT} (-m timeit)' in lines
 
 
 def test_domain_that_a_run_was_given_is_not_drawn(monkeypatch):

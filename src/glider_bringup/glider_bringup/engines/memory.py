@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.engines.processes import nodes_of
+from glider_bringup.engines.fork_server import FORK_SERVER, nodes_of
 
 #: Part of a flight before which memory may still grow: buffers fill, caches warm up.
 _SETTLED = 0.2
@@ -22,7 +22,7 @@ def memory_mb(entry: str) -> dict[str, float]:
         with suppress(FileNotFoundError, ProcessLookupError):
             lines = Path(f'/proc/{pid}/status').read_text(encoding='utf-8').splitlines()
             status = dict(line.split(':', 1) for line in lines)
-            if entry in status:
+            if name != FORK_SERVER and entry in status:
                 found[name] = int(status[entry].split()[0]) / 1024.0
     return found
 

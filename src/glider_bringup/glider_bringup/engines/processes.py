@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flies a scenario over ROS 2: its processes, started, watched and stopped together."""
 
-import ctypes
 import json
 import os
 import selectors
@@ -15,12 +14,14 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, Literal, NamedTuple, get_args
+from typing import IO, Any, Literal, NamedTuple
 
 from glider_base import wiring
 from glider_base.errors import FATAL
 from glider_base.ros.places import NAMESPACE, domain_id
 from glider_base.wiring import WIRING
+from glider_bringup.engines.fork_server import FORK_SERVER, tie_to
+from glider_bringup.engines.janitor import is_alive
 
 PLANT, RECORDER = wiring.PLANT.node, 'recorder_node'
 
@@ -52,7 +53,8 @@ _TO_WRITE_S = 8.0
 _LEAVE_S = 3.0
 #: The recorder hears the last messages within this time (s) after the plant has stopped.
 _HEAR_S = 0.5
-_LIBC, _PR_SET_PDEATHSIG = ctypes.CDLL(None), 1
+#: The fork server is gone within this time (s) after the nodes.
+_END_S = 1.0
 #: A failure is seen within this time (s) after nodes left because of it, on a busy machine too.
 _AFTERMATH_S = 3.0
 
@@ -105,42 +107,15 @@ def node_environment(domain: int) -> dict[str, str]:
     }
 
 
-def nodes_of(runner: int) -> dict[str, int]:
-    """Process ids, by name, of the nodes of a runner that are alive."""
-    layouts = map(process_modules, get_args(Layout))
-    names = {module: name for modules in layouts for name, module in modules.items()}
-    found = {}
-    for children in Path(f'/proc/{runner}/task').glob('*/children'):
-        with suppress(FileNotFoundError, ProcessLookupError):
-            for pid in children.read_text(encoding='ascii').split():
-                words = Path(f'/proc/{pid}/cmdline').read_text(encoding='utf-8').split('\0')
-                if name := names.get(''.join(words[2:3])):
-                    found[name] = int(pid)
-    return found
-
-
 class _Process:
     """One node and what it says."""
 
-    def __init__(self, name: str, command: Sequence[str], environment: dict[str, str]) -> None:
+    def __init__(self, name: str) -> None:
         self.name = name
-        runner, last_signal = os.getpid(), signal.SIGTERM if name == RECORDER else signal.SIGKILL
-        self.popen = subprocess.Popen(
-            command,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            start_new_session=True,
-            preexec_fn=lambda: _tie_to(runner, last_signal),
-        )
+        self.pid: int | None = None
+        self.code: int | None = None  #: with which it has ended; negative: the signal
         self.last_line = ''
         self.fatal = ''
-
-    @property
-    def code(self) -> int | None:
-        """With which it has ended; negative: the signal."""
-        return self.popen.poll()
 
     def note(self, line: str) -> None:
         """Remember a line for the case that it was the last."""
@@ -150,6 +125,11 @@ class _Process:
             self.fatal += '\n' + line
         if line.strip():
             self.last_line = line.strip()
+
+    def send(self, number: int) -> None:
+        if self.pid is not None and self.code is None:
+            with suppress(ProcessLookupError):  # it went with the fork server
+                os.kill(self.pid, number)
 
     def epitaph(self) -> str:
         """How the process ended, in words."""
@@ -163,11 +143,52 @@ class _Process:
         return f'{self.name} ended with exit code {self.code}{tail}'
 
 
-def _tie_to(runner: int, last_signal: int) -> None:
-    """Have this process sent a signal when its runner ends."""
-    _LIBC.prctl(_PR_SET_PDEATHSIG, int(last_signal))
-    if os.getppid() != runner:
-        os._exit(1)
+class _ForkServer(_Process):
+    """The process that starts the nodes and tells how they end."""
+
+    def __init__(self) -> None:
+        super().__init__(FORK_SERVER)
+        self._popen: subprocess.Popen | None = None
+
+    def start(
+        self, plan: Sequence[tuple[str, Sequence[str], int, int, int]], environment: dict[str, str]
+    ) -> tuple[int, IO[bytes]]:
+        """Start it with what `fork_server` wants to know; gives what it tells, and its output."""
+        told, says = os.pipe()
+        parent = os.getpid()
+        self._popen = subprocess.Popen(
+            [sys.executable, '-m', 'glider_bringup.engines.fork_server', str(says)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            pass_fds=[says, *(end for _, _, out, error, _ in plan for end in (out, error))],
+            env=environment,
+            start_new_session=True,
+            preexec_fn=lambda: tie_to(parent, signal.SIGKILL),
+        )
+        os.close(says)
+        self.pid = self._popen.pid
+        with suppress(BrokenPipeError):  # it is gone already, which is seen soon
+            self._popen.stdin.write(json.dumps(plan).encode() + b'\n')
+            self._popen.stdin.flush()
+        return told, self._popen.stdout
+
+    def look(self) -> bool:
+        """Whether it is gone."""
+        self.code = self._popen.poll() if self._popen else None
+        return self.code is not None
+
+    def finish(self, patience_s: float) -> None:
+        """End it. It has no nodes any more, or they go with it."""
+        if self._popen is None:
+            return
+        with suppress(BrokenPipeError):
+            self._popen.stdin.close()
+        try:
+            self._popen.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            self._popen.kill()
+            self._popen.wait()
 
 
 class _Janitor:
@@ -202,23 +223,35 @@ class _Run:
     def __init__(self, on_progress, on_log) -> None:
         self._on_progress, self._on_log = on_progress, on_log
         self._selector = selectors.DefaultSelector()
-        self._partial: dict[IO[bytes], bytes] = {}
+        self._partial: dict[int, bytes] = {}
         self.signal: int | None = None
         self.first_tick_s: float | None = None
         self.progress: dict[str, Any] = {}
         self.processes: dict[str, _Process] = {}
+        self._server = _ForkServer()
         self._janitor = _Janitor()
 
     def start(self, commands: Mapping[str, Sequence[str]], environment: dict[str, str]) -> None:
-        """Start a process per node."""
+        """Have a process started per node."""
+        plan, ends = [], []
         for name, command in commands.items():
-            process = self.processes[name] = _Process(name, command, environment)
-            self._janitor.watch(process.popen.pid)
-            self._listen(process.popen.stdout, partial(self._say, process, from_stdout=True))
-            self._listen(process.popen.stderr, partial(self._say, process))
+            process = self.processes[name] = _Process(name)
+            last_signal = signal.SIGTERM if name == RECORDER else signal.SIGKILL
+            (out, out_end), (error, error_end) = os.pipe(), os.pipe()
+            self._listen(out, partial(self._say, process, from_stdout=True))
+            self._listen(error, partial(self._say, process))
+            plan.append((name, list(command), out_end, error_end, int(last_signal)))
+            ends += [out_end, error_end]
+        told, output = self._server.start(plan, environment)
+        for end in ends:
+            os.close(end)
+        self._listen(told, self._hear)
+        self._listen(os.dup(output.fileno()), partial(self._say, self._server))
+        output.close()
 
-    def _listen(self, pipe: IO[bytes], take: Callable[[str], None]) -> None:
+    def _listen(self, pipe: int, take: Callable[[str], None]) -> None:
         """Have the lines from a pipe taken."""
+        os.set_blocking(pipe, False)
         self._selector.register(pipe, selectors.EVENT_READ, take)
         self._partial[pipe] = b''
 
@@ -226,19 +259,34 @@ class _Run:
 
     def pump(self, timeout_s: float) -> None:
         """Pass on what the nodes have said, waiting at most ``timeout_s`` for it."""
+        gone = self._server.look()  # first, so that all it had to tell is heard below
         for key, _ in self._selector.select(timeout_s):
-            self._read(key.fileobj, key.data)
+            self._read(key.fd, key.data)
+        if gone:
+            for process in self.processes.values():
+                if process.code is None and (process.pid is None or not is_alive(process.pid)):
+                    process.code = -signal.SIGKILL
 
-    def _read(self, pipe: IO[bytes], take: Callable[[str], None]) -> None:
-        data = os.read(pipe.fileno(), 65536)
+    def _read(self, pipe: int, take: Callable[[str], None]) -> None:
+        data = os.read(pipe, 65536)
         *lines, rest = (self._partial[pipe] + data).split(b'\n')
         self._partial[pipe] = rest
         if not data:
             self._selector.unregister(pipe)
-            pipe.close()
+            os.close(pipe)
             lines += [rest] if rest else []
         for line in lines:
             take(line.decode(errors='replace'))
+
+    def _hear(self, line: str) -> None:
+        """Take what the fork server tells of a node: first its process id, then its exit code."""
+        name, number = json.loads(line)
+        process = self.processes[name]
+        if process.pid is None:
+            process.pid = number
+            self._janitor.watch(number)
+        else:
+            process.code = number
 
     def _say(self, process: _Process, line: str, from_stdout: bool = False) -> None:
         if from_stdout and process.name == RECORDER and line.startswith('{'):
@@ -260,9 +308,11 @@ class _Run:
             if self.signal is not None:
                 return 'aborted', None
             ended = [p for p in self.processes.values() if p.code is not None]
-            if not ended:
+            if not ended and self._server.code is None:
                 continue
             self.pump(0.0)
+            if self._server.code is not None:
+                return 'failed', self._server
             if not self.progress.get('complete'):
                 return 'failed', self._culprit()
             self._wait_for(self.processes.values(), _LEAVE_S)
@@ -295,6 +345,8 @@ class _Run:
         last, so that it has everything.
         """
         by_name = self.processes.values()
+        if any(p.pid is None for p in by_name):  # in the middle of the start
+            self._server.finish(0.0)
         groups = (
             [p for p in by_name if p.name in _MAKES_TIME],
             [p for p in by_name if p.name not in (*_MAKES_TIME, RECORDER)],
@@ -307,18 +359,19 @@ class _Run:
                 if all(p.code is not None for p in group):
                     break
                 for process in group:
-                    process.popen.send_signal(number)
+                    process.send(number)
                 writes = group is groups[2] and number == signal.SIGINT
                 self._wait_for(group, patience_s + _TO_WRITE_S * writes)
             if running and group is groups[0] and first == 0:
                 self._wait_for(groups[2], _HEAR_S)
+        self._server.finish(_END_S)
         while self._selector.get_map():
             before = len(self._selector.get_map())
             self.pump(0.2)
             if len(self._selector.get_map()) == before and not self._selector.select(0):
                 break
-        for pipe in list(self._partial):
-            pipe.close()
+        for pipe in list(self._selector.get_map()):
+            os.close(pipe)
         self._selector.close()
         self._janitor.finish()
 
