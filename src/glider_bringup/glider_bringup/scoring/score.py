@@ -20,11 +20,9 @@ import numpy as np
 from glider_base.frames import (
     OriginSettings,
     euler_from_quaternion,
-    heading_of,
     odometry_from_wire,
-    pitch_of,
     poses_from_wire,
-    swap_world,
+    reference_from_wire,
 )
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Odometry
@@ -85,24 +83,18 @@ _TARGET = slice(_FIRST_REFERENCE, _FIRST_REFERENCE + 2)
 
 
 @kernel
-def _attitude(wire):
-    """Quaternion of NED and FRD of an odometry as on the wire, or a reference laid out like it."""
-    return swap_world(wire[3], wire[4], wire[5], wire[6])
-
-
-@kernel
 def _series_of(log, told):
     """`_SERIES` of log rows with the true motion, and as they were told, float64[16, n]."""
     series = np.empty((len(_SERIES), len(log)))
     for k in range(len(log)):
-        row, odom, reference = log[k], log[k, _FIRST_ODOM:], log[k, _FIRST_REFERENCE:]
-        attitude, pitch_ref = _attitude(odom), pitch_of(*_attitude(reference))
-        motion = (-odom[2], row[_E2], told[k, _E2])
-        angles = (pitch_of(*attitude), pitch_ref, heading_of(*attitude))
-        asked = (-reference[9], reference[1], reference[0], row[_INFEASIBLE])
+        row, joints = log[k], log[k, _FIRST_JOINT:]
+        x = odometry_from_wire(row[_FIRST_ODOM:])
+        wanted = reference_from_wire(row[_FIRST_REFERENCE:])
+        _, pitch, heading = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
+        motion = (x.p_d, row[_E2], told[k, _E2], pitch, wanted.theta, heading)
+        asked = (wanted.v_d, wanted.p_n, wanted.p_e, row[_INFEASIBLE])
         bits = (row[_GUARD], float(int(row[_SATURATION]) | int(row[_GUARD])))
-        joints = row[_FIRST_JOINT:]
-        values = motion + angles + asked + bits + (joints[0], joints[1], joints[2], joints[3])
+        values = motion + asked + bits + (joints[0], joints[1], joints[2], joints[3])
         for i in range(len(values)):
             series[i, k] = values[i]
     return series
