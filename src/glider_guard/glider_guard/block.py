@@ -34,7 +34,12 @@ def guard_tick(state, t_s, inputs, params, dt):
         battery=Battery(battery[0], battery[1], battery[2], battery[3], battery[4]),
         known=covariance_from_wire(odom),
     )
+    missed_s = t_s - state.t_s - dt
+    if state.tick > 0 and missed_s > dt:
+        seen = state.witness  # before a silence, or a pause: as old as that
+        state = replace(state, witness=replace(seen, own_s=seen.own_s + missed_s))
     state, out = guard_step(state, heard, params, dt)
+    state = replace(state, t_s=t_s)
     command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)
     return state, (command, (1.0 if out.drops else 0.0,)), (out.told,)
 

@@ -120,6 +120,7 @@ class GuardState(NamedTuple):
     fixes: FixWatch = FixWatch()
     command: Joints = _REST  #: the last one
     told: int = 0  #: rows
+    t_s: float = 0.0  #: of this tick (s)
 
 
 INITIAL_GUARD = GuardState()

@@ -65,13 +65,8 @@ class GuardNode(BlockNode):
         return command
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
-        """Answer one tick; what was seen before a silence, or a pause, is as old as that."""
+        """Answer one tick."""
         self.stale_ticks, self.ascent = 0, INITIAL_ASCENT
-        missed_s = (stamp_ns - self.said[0]) / 1e9 - self.passed * TICK_S
-        if self.said[1] and missed_s > TICK_S:
-            seen = self.state.witness
-            seen = seen._replace(own_s=seen.own_s + missed_s)
-            self.state = self.state._replace(witness=seen)
         super().step(stamp_ns, *inputs)
 
     def on_stale(self, stamp_ns: int, cycles: int) -> None:

@@ -115,7 +115,7 @@ class RecordedLog:
         if len(found) > 1:
             raise ConfigurationError(
                 f'{bag.files[0]}: several gliders are recorded: {", ".join(found)}; a bag of one '
-                f'is needed'
+                'is needed'
             )
         (self._namespace,) = found or '/'
         known = known_topics(self._namespace)
