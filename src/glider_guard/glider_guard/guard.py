@@ -324,5 +324,6 @@ def guard_step(
         fixes=fixes,
         command=command,
         told=told,
+        t_s=state.t_s,
     )
     return state, output
