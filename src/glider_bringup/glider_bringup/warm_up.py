@@ -64,9 +64,12 @@ def fly_one_tick() -> None:
 
 
 def score_nothing() -> None:
-    """Score a flight that has none, make its traces; and a trim."""
+    """Score a flight that has none, make its traces; and a trim.
+
+    Of two ticks: columns of one row are another kind of array.
+    """
     scenario = load_scenario()
-    log = np.zeros((1, ROW))
+    log = np.zeros((2, ROW))
     scorer = Scorer()
     scorer.add(log)
     scorer.result(Rules())
