@@ -104,6 +104,21 @@ def test_a_plan_tells_time_and_energy_of_a_flight_that_surfaces_and_of_one_that_
 
 
 @pytest.mark.parametrize(
+    ('vehicle', 'depth_m', 'net_heaviness_kg'),
+    [('seaglider', 200.0, 0.2), ('seaglider', 600.0, 0.15), ('zhang2021', 300.0, 0.4)],
+)
+def test_a_plan_counts_what_is_pumped_as_the_nose_goes_over_and_a_dive_that_is_begun(
+    vehicle, depth_m, net_heaviness_kg
+):
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 9_000.0, 'at_end': 'stop'}
+    yo = {'profile.depth_m': depth_m, 'profile.net_heaviness_kg': net_heaviness_kg}
+    yo |= {'profile.surface_every_dives': 1, 'dives': 0, 'duration_s': 2e5}
+    scenario = load_scenario('current_8deg', {'vehicle': vehicle, 'path': path, **yo})
+    flown = glider.fly(scenario).score
+    assert planned(scenario).wh == pytest.approx(flown['energy']['wh'], rel=0.05)
+
+
+@pytest.mark.parametrize(
     ('fields', 'note'),
     [
         (['water.bottom_m=150'], 'dives to 200 m touch a bottom at 150 m'),

@@ -17,6 +17,8 @@ from glider_mission.routing.fronts import Chart, fronts, sail
 from glider_mission.scenario import Scenario
 from glider_model.ocean.bottom import FlatBottom, bottom_depth, least_height
 from glider_model.ocean.density import immersed
+from glider_model.onboard.command_filter import Filtered, filter_angle
+from glider_model.onboard.glide_polar import glide_net_heaviness
 from glider_model.vehicle.file import load_vehicle
 
 #: A route is straightened where that moves it by less than this (m).
@@ -29,7 +31,7 @@ _DIVE_M = 200.0
 MEMBERS = 12
 #: What is left of the speed of the polar for a vehicle that steers, by what eddies_10d flies (-).
 _HELD_SHARE = 0.985
-#: Levels of a climb at which it is looked at.
+#: Levels of a dive at which it is looked at.
 _LEVELS = 21
 
 
@@ -40,6 +42,8 @@ class Pace(NamedTuple):
     cycle_s: float  #: from one stay at the surface to the next, or of a dive without one (s)
     stay: float  #: share of the time that it is at the surface (-)
     cycle_wh: float | None  #: that it takes; None where the battery is not known
+    dives: int  #: of a cycle
+    dive_wh: float  #: that a dive more takes on the same way down and up: at the surface
 
 
 class Route(NamedTuple):
@@ -83,11 +87,16 @@ class Plan(NamedTuple):
 
     @property
     def wh(self) -> float | None:
-        """Energy until the arrival, of half of the errors; None where nobody knows."""
-        time_s = self.arrival_s(50.0)
-        if self.pace.cycle_wh is None or not math.isfinite(time_s):
+        """Energy until the arrival, of half of the errors; None where nobody knows.
+
+        The last dives share what is left, and are shallower.
+        """
+        time_s, pace = self.arrival_s(50.0), self.pace
+        if pace.cycle_wh is None or not math.isfinite(time_s):
             return None
-        return self.pace.cycle_wh * time_s / self.pace.cycle_s
+        cycles = time_s / pace.cycle_s
+        more = math.ceil(cycles * pace.dives) - cycles * pace.dives
+        return pace.cycle_wh * cycles + pace.dive_wh * more
 
 
 def pace_of(scenario: Scenario) -> Pace:
@@ -100,44 +109,59 @@ def pace_of(scenario: Scenario) -> Pace:
     glide_s = 2.0 * (dives * profile.depth - turns * profile.top_depth) / profile.glide_rate
     cycle_s = glide_s + 2.0 * dives * profile.lead_s + stay_s
     speed = _HELD_SHARE * glide_s * params.profile_speed / cycle_s
-    return Pace(speed, cycle_s, stay_s / cycle_s, _cycle_wh(scenario, params, cycle_s, stay_s))
+    cycle_wh, dive_wh = _energy(scenario, params, cycle_s, stay_s)
+    return Pace(speed, cycle_s, stay_s / cycle_s, cycle_wh, dives, dive_wh)
 
 
-def _cycle_wh(
+def _energy(
     scenario: Scenario, params: GuidanceParams, cycle_s: float, stay_s: float
-) -> float | None:
-    """Energy (Wh) of `Pace.cycle_s`: pump, electronics and, at the surface, a call."""
+) -> tuple[float | None, float]:
+    """Energy (Wh) of `Pace.cycle_s`: pump, electronics and, at the surface, a call; `dive_wh`."""
     vehicle, profile = load_vehicle(scenario.vehicle), params.profile
     if vehicle.energy is None:
-        return None
-    told, water, body = (
-        vehicle.energy.params(),
-        scenario.resolved_water().params(),
-        vehicle.params(),
-    )
+        return None, 0.0
+    told, body = vehicle.energy.params(), vehicle.params()
+    levels = np.linspace(0.0, profile.depth, _LEVELS)
+    water = scenario.resolved_water().params()
+    empty = [immersed(float(depth), 0.0, body, water) for depth in levels]
 
-    def heaviness(depth: float, net: float) -> float:
-        """What the pump makes of it (kg) for a net weight (kg) in the water of a depth (m)."""
-        empty = immersed(depth, 0.0, body, water)
-        return (net - empty.net) / empty.ratio
+    def heaviness(net: float) -> np.ndarray:
+        """What the pump makes of it (kg) at the levels for a net weight (kg)."""
+        return np.array([(net - one.net) / one.ratio for one in empty])
 
-    def cost(depth: float) -> float:
-        """Of as much pumped out there, and let in again (J/kg)."""
-        return max(0.0, told.out + told.out_per_m * depth) + max(0.0, told.let_in)
-
-    levels = np.linspace(profile.depth, 0.0, _LEVELS)
-    rising = [heaviness(float(depth), -profile.climb_net_heaviness) for depth in levels]
-    heavy = heaviness(profile.depth, profile.net_heaviness)
+    sinking, rising = heaviness(profile.net_heaviness), heaviness(-profile.climb_net_heaviness)
+    out_kg = np.maximum(0.0, -np.diff(sinking)) + np.maximum(0.0, np.diff(rising))
+    heavy = sinking[-1]
     law = scenario.control.buoyancy  # it takes a part of what the water makes of it for drag
     as_drag = law.drag_ki_kg_per_m / (law.ki_kg_per_m + law.drag_ki_kg_per_m or 1.0)
-    turns = heavy - rising[0] + 2.0 * as_drag * max(0.0, heavy - profile.net_heaviness)
-    pumped = turns * cost(profile.depth)
-    for depth, before, after in zip(levels, rising, rising[1:], strict=False):
-        pumped += max(0.0, before - after) * cost(float(depth))
-    pumped *= max(1, profile.surface_every)
+    out_kg[-1] += heavy - rising[-1] + 2.0 * as_drag * max(0.0, heavy - profile.net_heaviness)
+    # as much pumped out at a level, and let in again (J/kg)
+    costs = np.maximum(0.0, told.out + told.out_per_m * levels) + max(0.0, told.let_in)
+    dives, call, top = max(1, profile.surface_every), 0.0, 0.0
+    if stay_s:
+        over_kg = min(_over_kg(params, vehicle.slowest_pump_rate(0.0)), body.m_b_max + rising[0])
+        top = max(0.0, over_kg) * costs[0]
+        call = told.call_start + told.call * min(told.call_s, stay_s)
     hotel = 0.5 * (told.dive + told.climb) * (cycle_s - stay_s) + told.surface * stay_s
-    call = told.call_start + told.call * min(told.call_s, stay_s) if stay_s else 0.0
-    return (pumped + hotel + call) / 3600.0
+    flat = (dives * out_kg.sum() * costs[0] + top + call) / dives
+    return (dives * out_kg @ costs[1:] + top + call + hotel) / 3600.0, flat / 3600.0
+
+
+def _over_kg(params: GuidanceParams, pump_kgps: float) -> float:
+    """What is pumped out (kg) beyond a climb's before a dive, as the nose goes over.
+
+    The pump follows, at its rate, the weight of the climb at the pitch that is asked for. That of
+    a shallow one is more.
+    """
+    pitch, step = Filtered(params.profile.climb_pitch, 0.0), pump_kgps * TICK_S
+    heavy = climb = glide_net_heaviness(pitch.value, -params.profile.climb_rate, params.polar)
+    for _ in range(params.profile.prepare_ticks):
+        pitch = filter_angle(pitch, -params.profile.pitch, 0.0, params.pitch_filter, TICK_S)
+        wanted = glide_net_heaviness(pitch.value, -params.profile.climb_rate, params.polar)
+        if wanted > heavy:
+            break
+        heavy = max(wanted, heavy - step)
+    return climb - heavy
 
 
 def route_through(
