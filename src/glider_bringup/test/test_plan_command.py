@@ -7,20 +7,24 @@ import json
 import matplotlib.image
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import glider_bringup as glider
 from glider_base.frames import poses_from_wire
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
+from glider_bringup.cli import app
 from glider_bringup.commands.plan import plan
 from glider_bringup.engines.flight import fly
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.score import Scorer, scores_of
+from glider_bringup.showing.findings import findings
+from glider_bringup.showing.flown_run import read_run
 from glider_mission.blocks import COLUMNS
 from glider_mission.routing import pilot as piloting
 from glider_mission.routing.plan import plan as planned
 from glider_mission.run_folder import make_run_folder
-from glider_mission.scenario import load_scenario
+from glider_mission.scenario import load_scenario, scenario_names
 
 #: Two dives on a route that is planned anew between them.
 SHORT = {'dives': 2, 'profile.depth_m': 500.0}
@@ -124,16 +128,31 @@ def test_a_plan_counts_what_is_pumped_as_the_nose_goes_over_and_a_dive_that_is_b
         (['water.bottom_m=150'], 'dives to 200 m touch a bottom at 150 m'),
         (['water.bottom_m=15', 'profile.clearance_m=10'], 'no dives where the bottom is 15 m'),
         (['orders=[{at_s: 900, depth_m: 50}]'], '1 order of the mission not counted'),
+        (['profile.net_heaviness_kg=0.14', 'profile.pitch_deg=20'], 'dives and climbs are not'),
+        (['profile.climb_net_heaviness_kg=0.05'], 'climbs are not steered by roll'),
+        (['profile.net_heaviness_kg=0.05', 'vehicle=slocum_g2'], None),
+        (['profile.net_heaviness_kg=0.1', 'vehicle=seaglider'], None),
         (['water.bottom_m=150', 'profile.clearance_m=10'], None),
         (['water.bottom_m=250'], None),
     ],
 )
-def test_a_plan_tells_of_a_bottom_that_its_dives_touch_and_what_it_does_not_count(
+def test_a_plan_tells_of_a_bottom_of_glides_not_steered_and_of_what_it_does_not_count(
     fields, note, capsys
 ):
     plan('survey', fields, as_json=True)
     told = json.loads(capsys.readouterr().out)['notes']
     assert len(told) == bool(note) and all(one.startswith(note) for one in told)
+
+
+def test_a_flight_whose_glides_are_not_steered_says_so_before_and_after(tmp_path):
+    fields = 'profile.net_heaviness_kg=0.14', 'profile.pitch_deg=20'
+    asked = ['run', 'current_8deg', '--engine', 'direct', '--duration', '60']
+    asked += [word for field in fields for word in ('--set', field)]
+    done = CliRunner().invoke(app, [*asked, '--out', str(tmp_path / 'run')])
+    assert done.exit_code == 0 and 'dives and climbs are not steered by roll' in done.stderr
+    said = [text for _, text in findings(read_run(tmp_path / 'run'))]
+    assert any(text.startswith('Dives and climbs are not steered by roll') for text in said)
+    assert not any(load_scenario(name).unsteered for name in scenario_names())
 
 
 def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(tmp_path):

@@ -218,6 +218,19 @@ class Scenario(Settings):
         return ', '.join(filter(None, (self.description, but)))
 
     @property
+    def unsteered(self) -> list[str]:
+        """Which of its glides are too slow to be steered by roll, in words."""
+        vehicle, profile = load_vehicle(self.vehicle), self.guidance_settings().params().profile
+        slowest, rates = vehicle.params().slowest_glide, (profile.dive_rate, profile.climb_rate)
+        slow = {n: r for n, r in zip(('dives', 'climbs'), rates, strict=True) if r < slowest}
+        if not slow or vehicle.steers_by or profile.follows_path:
+            return []
+        return [
+            f'{" and ".join(slow)} are not steered by roll, at {min(slow.values()):.3f} m/s of '
+            f'vertical rate: it takes {slowest:g} m/s, slowest_glide of the vehicle'
+        ]
+
+    @property
     def is_charted(self) -> bool:
         """Whether it says where on the Earth it is: then people read its places in degrees."""
         in_degrees = getattr(self.path, 'waypoints_latlon', None) is not None

@@ -81,7 +81,8 @@ def _notes(made: Any, scenario: Scenario) -> list[str]:
     from glider_mission.routing.plan import bottom_under
 
     orders, profile = len(scenario.orders), scenario.profile
-    notes = [f'{count(orders, "order")} of the mission not counted'] if orders else []
+    notes = scenario.unsteered
+    notes += [f'{count(orders, "order")} of the mission not counted'] if orders else []
     bottom_m = bottom_under(made.route.corners, scenario.bottom())
     if bottom_m <= profile.depth_m and not profile.clearance_m:
         notes.append(f'dives to {profile.depth_m:,.0f} m touch a bottom at {bottom_m:,.0f} m')

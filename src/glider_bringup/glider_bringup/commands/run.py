@@ -211,6 +211,8 @@ def _fly(
     tracer = make_tracer(scenario) if report else None
     with run_folder(scenario, out) as folder:
         messages.print(f'{scenario.name}: {scenario.described}')
+        for note in scenario.unsteered:
+            tell(note)
         with progress(planned_ticks(scenario)) as (flying, reading):
             if begin_view:
                 flying = _after_first(begin_view, flying)
