@@ -13,7 +13,7 @@ import pytest
 
 from fuzzing import flights
 from fuzzing.counts import Counter
-from glider_bringup.engines.direct import NotFiniteError, fly_blocks
+from glider_bringup.engines.direct import FlightError, fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import fly_scored, scorecard
@@ -101,7 +101,7 @@ def test_scored_again_it_has_failed_too(blown, tmp_path):
 def test_every_tick_before_is_finite_and_given(driven):
     changes = {'vehicle': str(driven), 'dives': 0, 'duration_s': DURATION_S}
     ticks = 0
-    with pytest.raises(NotFiniteError, match='not finite at tick') as error:
+    with pytest.raises(FlightError, match='not finite at tick') as error:
         for log in fly_blocks(*mission_of(load_scenario(changes=changes))):
             assert math.isfinite(log.sum())
             ticks += len(log)

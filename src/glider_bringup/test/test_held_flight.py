@@ -14,7 +14,7 @@ import pytest
 
 import glider_bringup as glider
 from glider_base.kernel import kernel
-from glider_bringup.engines.direct import NotFiniteError
+from glider_bringup.engines.direct import FlightError
 from glider_control.law import LawSettings, law_step
 from glider_guard.rows import LATCHED
 from glider_guidance.settings import GuidanceSettings
@@ -177,6 +177,7 @@ def test_an_order_costs_as_much_after_many_as_after_none(monkeypatch):
 
 class Failing(NamedTuple):
     at: int
+    raises: bool
 
 
 class Called(NamedTuple):
@@ -187,9 +188,10 @@ class FailingLaw(LawSettings):
     """Holds pitch, until it was called so often."""
 
     at: int = 1_000_000
+    raises: bool = False
 
     def params(self, vehicle, bank):
-        return Failing(self.at)
+        return Failing(self.at, self.raises)
 
     def initial_state(self):
         return Called(0)
@@ -199,13 +201,17 @@ class FailingLaw(LawSettings):
 @kernel
 def failing_step(state, seen, params, dt):
     pitch = 25.0 * (seen.reference.theta - seen.measured.theta) - 40.0 * seen.measured.theta_dot
+    if state.times == params.at and params.raises:
+        raise ValueError('none of yours')
     if state.times == params.at:
         pitch = math.nan
     return Called(state.times + 1), -20.0 * seen.measured.phi_dot, pitch
 
 
-def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up():
-    fields = {'profile.depth_m': 15.0}
+@pytest.mark.parametrize('raises', [False, True])
+def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up(raises):
+    told = 'ValueError: none of yours at tick' if raises else 'wrench is not finite at tick'
+    fields = {'profile.depth_m': 15.0, 'control.FailingLaw.raises': raises}
     flight = glider.Flight('current_8deg', fields, law=FailingLaw)
     surfaced = flight.until('surfacing')
     at = flight.state.kept.mission.control.law.times + 10
@@ -217,13 +223,17 @@ def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up():
         )
         failing.until(t_s=0.1 * (surfaced.tick - 100))
         assert failing.until('surfacing') == surfaced
-        with pytest.raises(NotFiniteError, match='wrench is not finite') as error:
+        with pytest.raises(FlightError, match=told) as error:
             while True:
                 failing.step(step)
         assert failing.is_over and failing.step() == ('end', surfaced.tick + 10)
         assert numbers(failing) == numbers(flight)
         ended.add(str(error.value))
-    assert len(ended) == 1
+    (said,) = ended
+    score = glider.fly(
+        'current_8deg', {**fields, 'control.FailingLaw.at': at}, law=FailingLaw
+    ).score
+    assert (score['status'], score['reason'], score['ticks']) == ('failed', said, flight.tick)
 
 
 @pytest.mark.parametrize(

@@ -14,10 +14,8 @@ from typing import Any
 import numpy as np
 
 from glider_base.errors import ConfigurationError, shown
-from glider_bringup.engines.flight import fly
-from glider_bringup.scoring.card import STOPPED, finite
+from glider_bringup.scoring.card import STOPPED, finite, fly_scored
 from glider_bringup.scoring.navigation import FOURTH
-from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.scoring.scores import SCORES, studied
 from glider_mission.changes import overlap, run_command
 from glider_mission.scenario import Scenario, load_scenario
@@ -235,7 +233,7 @@ def _check_changes(changes: dict[str, Any], plant: dict[str, Any]) -> None:
         raise ConfigurationError(f'--set {field}={shown(value)}: {why}')
 
 
-def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
+def judge(scores: dict, status: str = 'completed', reason: str = '') -> dict[str, Any]:
     """Figures of one flight, and whether it diverged; a figure that is not finite is None.
 
     A flight that failed, was lost, or could not hold its course has diverged, whatever it was
@@ -249,6 +247,7 @@ def judge(scores: dict, status: str = 'completed') -> dict[str, Any]:
     return {
         'diverged': diverged,
         'outcome': outcome(scores, failed, diverged),
+        'reason': reason or scores['reason'],
         **clean,
         'navigation': finite({name: scores['navigation'][name] for name in NAVIGATION}),
     }
@@ -276,14 +275,8 @@ def _farthest_m(scores: dict) -> float:
 
 def _fly_plant(scenario: Scenario) -> dict[str, Any]:
     """Fly one scenario in a worker."""
-    scorer = Scorer(scenario)
-    try:
-        status = fly(scenario, [scorer]).status
-    except ConfigurationError:
-        raise
-    except Exception:  # of a law that raises, say: it is the end of this flight only
-        status = 'failed'
-    return judge(scores_of(scenario, scorer), status)
+    flight, scores = fly_scored(scenario)
+    return judge(scores, flight.status, flight.reason)
 
 
 def _check_plant(scenario: Scenario) -> dict[str, Any]:

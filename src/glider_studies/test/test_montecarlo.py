@@ -181,6 +181,7 @@ def scores(**changes):
         'heading_fluctuation_deg': {'rms_steady': 0.1, 'max_steady': 0.2},
         'final_state': {'position_ned_m': [1.0, 2.0, 3.0], 'attitude_rpy_rad': [0.0, 0.0, 0.0]},
         'status': 'completed',
+        'reason': '',
         'navigation': dict.fromkeys(NAVIGATION),
         'energy': {'wh': 7.0},
         'actuator_travel': {'roll_mass_deg': 800.0},
@@ -192,6 +193,7 @@ def test_a_good_run_has_not_diverged():
     assert judge(scores()) == {
         'diverged': False,
         'outcome': 'completed',
+        'reason': '',
         'max_steady_m': 0.5,
         'max_all_m': 5.0,
         'max_run_m': 9.0,
@@ -269,7 +271,9 @@ def test_a_law_that_raises_ends_its_own_flight_only():
         (1, 'raises'): chosen_scenario('current_8deg', *changes),
     }
     flights, _ = montecarlo.fly_plants(scenarios, Here(), None)
-    assert [one['outcome'] for one in flights.values()] == ['completed', 'failed']
+    told = [(one['outcome'], one['reason']) for one in flights.values()]
+    assert told[0] == ('completed', '') and told[1][0] == 'failed'
+    assert told[1][1].startswith('ValueError: none of yours at tick ')
 
 
 def test_result_is_one_json_object_of_the_promised_shape(study):
@@ -416,6 +420,9 @@ def test_a_result_is_never_written_over(tmp_path):
     (tmp_path / RESULT_FILE).write_text('{}')
     with pytest.raises(ConfigurationError, match='never written over'):
         make_result_folder(tmp_path, montecarlo.RESULT_FILE)
+    make_result_folder(tmp_path / 'at_once', montecarlo.RESULT_FILE)
+    with pytest.raises(ConfigurationError, match='another study is at work here'):
+        make_result_folder(tmp_path / 'at_once', montecarlo.RESULT_FILE)
 
 
 def _descendants(pid):

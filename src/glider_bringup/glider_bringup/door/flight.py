@@ -17,7 +17,7 @@ from glider_bringup.console import compiling
 from glider_bringup.door.run import chosen_scenario
 from glider_bringup.engines.compiling import told
 from glider_bringup.engines.direct import (
-    NotFiniteError,
+    FlightError,
     fault_of,
     finite_rows,
 )
@@ -210,9 +210,9 @@ class Flight:
 
         Raises
         ------
-        NotFiniteError
-            Where a number is none any more, with its name and tick; the flight is over then, and
-            stands where all were finite.
+        FlightError
+            Where a number is none any more, with its name and tick, or a law raises; the flight
+            is over then, and stands where all was well.
         """
         if event not in (*EVENTS, 'end'):
             allowed = ', '.join((*EVENTS, 'end'))
@@ -287,7 +287,7 @@ class Flight:
                     self.restore(before)._advance(int(begins[0]) + 1)
                 return Event(event, self.tick)
             if fault:
-                raise NotFiniteError(fault)
+                raise FlightError(fault)
         return Event('end' if self._past.is_over else 'time', self.tick)
 
     def _advance(self, ticks: int) -> tuple[np.ndarray, str]:
@@ -296,8 +296,12 @@ class Flight:
         Gives in words what is not, and the flight is over then.
         """
         first, past = self.tick, self._past
-        rows, is_over = self._held.fly(self._log[:ticks])
-        good, fault = finite_rows(self._log[:rows]), ''
+        fault = ''
+        try:
+            rows, is_over = self._held.fly(self._log[:ticks])
+        except FlightError as error:
+            rows, is_over, fault = 0, True, str(error)
+        good = finite_rows(self._log[:rows])
         if good < rows:
             fault, is_over = fault_of(self._log[good], first + good), True
             self._held.tick = first + good

@@ -34,8 +34,8 @@ from glider_navigation.block import navigation_tick
 from glider_navigation.settings import NavigationParams
 
 
-class NotFiniteError(Exception):
-    """A flight came to numbers that are none. The message says which, and when."""
+class FlightError(Exception):
+    """A flight cannot go on: a number is none, or a law raises. It says what, and when."""
 
 
 class MissionParams(NamedTuple):
@@ -100,23 +100,18 @@ def _hold(state, params):
 
 def hold(state: MissionState, params: MissionParams) -> HeldMission:
     """Have a mission held. The state that was given does not change with it."""
-    return _hold(packed(apart(state)), packed(params))
-
-
-def apart(state: MissionState) -> MissionState:
-    """The same state, which a flight of the other one does not change."""
-    current = state.current
-    return state._replace(current=current._replace(values=current.values.copy()))
+    return _hold(packed(state), packed(params))
 
 
 @kernel
 def fly_held(held, log, dt):
     """Fly until the log is full or the mission ends; rows filled, and whether it has ended.
 
-    The values of the state's current are changed where they lie.
+    Where a law raises, what is held has not changed.
     """
     in_plant, in_current, in_navigation, in_guidance, in_control, in_guard = held.params
     plant, current, navigation, guidance, control, guard = held.state
+    current = CurrentState(current.tick, current.values.copy())  # changed where they lie
     rows, finished = 0, False
     for row in range(log.shape[0]):
         t_s = plant.tick * dt
@@ -158,13 +153,9 @@ def fly_held(held, log, dt):
 
 
 @kernel
-def _state_of(held):
+def held_state(held):
+    """What is held, a `MissionState`."""
     return held.state
-
-
-def held_state(held: HeldMission) -> MissionState:
-    """What is held: a state of one's own."""
-    return apart(_state_of(held))
 
 
 @kernel
@@ -174,7 +165,7 @@ def _set_state(held, state):
 
 def set_held(held: HeldMission, state: MissionState) -> None:
     """Hold another state."""
-    _set_state(held, packed(apart(state)))
+    _set_state(held, packed(state))
 
 
 @kernel
@@ -221,7 +212,7 @@ def blocks_of(advance: Callable[[np.ndarray], tuple[int, bool]]) -> Iterator[np.
     """Fly block by block; ``advance`` fills rows of a log, and says how many, and if it is over.
 
     Yields float64[n, ROW], n <= BLOCK_TICKS, which is used again for the next block. Raises
-    NotFiniteError after the last tick of which every number is finite.
+    FlightError after the last tick of which every number is finite.
     """
     log = np.empty((BLOCK_TICKS, ROW))
     finished, ticks = False, 0
@@ -231,7 +222,7 @@ def blocks_of(advance: Callable[[np.ndarray], tuple[int, bool]]) -> Iterator[np.
         if good:
             yield log[:good]
         if good < rows:
-            raise NotFiniteError(fault_of(log[good], ticks + good))
+            raise FlightError(fault_of(log[good], ticks + good))
         ticks += rows
 
 

@@ -13,9 +13,9 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import NOT_FINITE, TICK_S, Battery
 from glider_base.wiring import WHEN_SILENT
 from glider_bringup.engines.direct import (
+    FlightError,
     MissionParams,
     MissionState,
-    NotFiniteError,
     blocks_of,
     fly_held,
     held_state,
@@ -52,7 +52,7 @@ Progress = Callable[[int, float], None]
 class Outcome(NamedTuple):
     """How a flight ended, apart from what its topics tell."""
 
-    status: str  #: completed, aborted, or failed: a number was not finite
+    status: str  #: completed, aborted, or failed: it could not go on
     reason: str  #: why it was aborted, or failed
     wall_time_s: float | None  #: None if nobody measured it
     messages_recorded: int = 0
@@ -172,7 +172,12 @@ class Held:
                 self._follow(order)
             self._own = ()
             ticks = int(min(len(log) - filled, ticks_alone(self._waiting, self.tick)))
-            flown, is_over = self._until_told(log[filled : filled + ticks])
+            try:
+                flown, is_over = self._until_told(log[filled : filled + ticks])
+            except FlightError:
+                if filled:  # it will be raised once more, of no rows
+                    break
+                raise
             filled += flown
             self.tick += flown
             self._look(log[filled - 1])
@@ -183,7 +188,7 @@ class Held:
         waits = wait_for_surface(self._waiting, self.tick)
         reacts = self._settings.no_progress != 'tell'
         before = held_state(self._held) if waits or reacts else None
-        rows, is_over = fly_held(self._held, log, TICK_S)
+        rows, is_over = self._until_raised(log)
         up = np.flatnonzero(is_surfaced(log[:rows, _STAGE])) if waits else ()
         stays = begins(log[:rows, _NO_PROGRESS], self._no_progress) if reacts else ()
         last = min((int(found[0]) + 1 for found in (up, stays) if len(found)), default=rows)
@@ -191,6 +196,18 @@ class Held:
             set_held(self._held, before)
             rows, is_over = fly_held(self._held, log[:last], TICK_S)
         return rows, is_over
+
+    def _until_raised(self, log: np.ndarray) -> tuple[int, bool]:
+        """Fill a log, or a part of it, if a law raises in the rest; a FlightError, if at once."""
+        try:
+            return fly_held(self._held, log, TICK_S)
+        except Exception as error:
+            if len(log) > 1:
+                return self._until_raised(log[: len(log) // 2])
+            what = f'{type(error).__name__}: {error}'
+            raise FlightError(
+                f'{what} at tick {self.tick} (t = {self.tick * TICK_S:.1f} s)'
+            ) from error
 
     def _look(self, row: np.ndarray) -> None:
         """Note what guidance and battery told at the last tick, and what it orders itself."""
@@ -310,7 +327,9 @@ def fly(
                 if interrupts:
                     status, reason = 'aborted', 'stopped by SIGINT'
                     break
-        except (NotFiniteError, DiskError) as error:
+        except FlightError as error:
+            status, reason = 'failed', str(error)
+        except DiskError as error:
             status, reason = ended(False, str(error)), str(error)
     orders = tuple(pilot.orders) if pilot else ()
     return Outcome(status, reason, time.perf_counter() - start, orders=orders)
