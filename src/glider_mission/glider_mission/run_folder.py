@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder of a run or a study: how its files are called, and what lies in a new one."""
 
+import fcntl
+import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -63,14 +65,24 @@ def write_scenario(scenario: Scenario, folder: Path) -> None:
 
 
 def make_result_folder(folder: Path, result: str) -> None:
-    """Folder for a study whose result is the file ``result``.
+    """Folder for a study whose result is the file ``result``, until this program ends.
 
-    Raises ConfigurationError if it cannot be made, or already holds a result.
+    Raises ConfigurationError if it cannot be made, already holds a result, or will hold that of
+    another study.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        handle = os.open(folder, os.O_RDONLY)
     except OSError as error:
         raise ConfigurationError(f'--out {folder}: {error.strerror}') from None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise ConfigurationError(
+            f'--out {folder}: another study is at work here (allowed: another folder)'
+        ) from None
+    except OSError:  # some file systems have no locks
+        pass
     if (folder / result).exists():
         raise ConfigurationError(
             f'--out {folder}: it has a {result} already; a result is never written over '
