@@ -323,6 +323,7 @@ WRONG = {
     'unknown': (['--set', 'depth=9'], {'set': {'depth': 9}}),
     'duration': (['--duration', '-1'], {'duration': -1}),
     'seed': (['--seed', '-1'], {'seed': -1}),
+    'file': (['--set', 'bathymetry.file=no.nc'], {'set': {'bathymetry.file': 'no.nc'}}),
 }
 
 
@@ -334,6 +335,7 @@ def test_mistake_is_told_in_the_words_of_the_command_line(case):
         glider.fly(**choices)
     assert isinstance(told.exception, glider.ConfigurationError)
     assert str(error.value) == str(told.exception)
+    assert case != 'file' or 'bathymetry.file no.nc: No such file' in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -741,6 +743,13 @@ def test_sweep_of_a_mapping_is_that_of_its_file(tmp_path):
         glider.sweep({'current.speed_kn': [99.0]})
     with pytest.raises(glider.ConfigurationError, match='no field'):
         glider.sweep({})
+    for choices, text in (
+        ({'workers': 0}, 'workers = 0: .*allowed: 1 and more'),
+        ({'workers': '2'}, "workers = '2': .*allowed: 1 and more"),
+        ({'scenario': 'current_8deg'}, 'has one of its own'),
+    ):
+        with pytest.raises(glider.ConfigurationError, match=text):
+            glider.sweep('small', **choices)
     for axes in ({'current.speed_kn': 0.5}, {'control.law': 'pid'}):
         (field,) = axes
         with pytest.raises(glider.ConfigurationError, match=rf'{field} = .*a list of values'):
