@@ -174,6 +174,8 @@ def test_port_that_is_taken_is_named_before_the_flight(glider, tmp_path):
 def test_direct_engine_has_nothing_to_view(glider, tmp_path):
     done = glider('run', '--view', '--engine', 'direct', '--out', tmp_path / 'run')
     check_refused(done, tmp_path / 'run', '--view', 'direct')
+    done = glider('run', '--view-port', 9000, '--engine', 'direct', '--out', tmp_path / 'run')
+    check_refused(done, tmp_path / 'run', '--view-port 9000', 'allowed: with --view')
 
 
 def test_missing_server_is_named_before_the_flight(tmp_path):

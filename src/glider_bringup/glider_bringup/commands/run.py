@@ -111,8 +111,9 @@ def run(
         bool, typer.Option('--view', help='Show the flight live in Foxglove (nodes only).')
     ] = False,
     view_port: Annotated[
-        int, typer.Option(min=1, max=65535, help='Port of the live view.')
-    ] = 8765,
+        int | None,
+        typer.Option(min=1, max=65535, help='Port of the live view. Default: 8765.'),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Fly a scenario; record it, write its report and print the scorecard.
@@ -126,11 +127,15 @@ def run(
     fields = chosen_fields(changed_fields(changes), controller, guidance, seed, duration)
     if sync != 'end' and engine == 'direct' and not bag:
         raise ConfigurationError(f'--sync {sync}: nothing is recorded (allowed: with --bag)')
+    if view_port and not view:
+        raise ConfigurationError(
+            f'--view-port {view_port}: no view is open (allowed: with --view)'
+        )
     rate, place = _checked(engine, speed, namespace, view, processes)
     flown = load_scenario(scenario, fields)
     layout = 'processes' if processes else 'together'
     nodes = {'speed': rate, 'namespace': place, 'layout': layout, 'on_log': tell}
-    with _view(view_port, place) if view else nullcontext() as begin_view:
+    with _view(view_port or 8765, place) if view else nullcontext() as begin_view:
         card, folder, has_room = _fly(flown, engine, out, bag, sync, report, begin_view, nodes)
     page = folder / REPORT_FILE
     if as_json:
