@@ -4,6 +4,7 @@
 
 from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
+from numbers import Integral
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -20,10 +21,12 @@ from glider_studies.sweep.plan import Plan, load_sweep
 from glider_studies.workers import worker_pool
 
 
-def _plan(name: str | Path | Mapping, scenario: str | Path, changes: dict[str, Any]) -> Plan:
+def _plan(
+    name: str | Path | Mapping, scenario: str | Path | None, changes: dict[str, Any]
+) -> Plan:
     """Plan of a sweep by name or file, or of a mapping."""
     if not isinstance(name, Mapping):
-        if scenario != DEFAULT_SCENARIO:
+        if scenario is not None:
             raise ConfigurationError(
                 f'scenario {scenario}: the sweep {name} has one of its own (allowed: with a '
                 'mapping of fields)'
@@ -44,7 +47,7 @@ def _plan(name: str | Path | Mapping, scenario: str | Path, changes: dict[str, A
         }
         for field, values in name.items()
     }
-    over = str(scenario)
+    over = str(scenario or DEFAULT_SCENARIO)
     if over not in scenario_names():
         over = str(scenario_path(over).resolve())
     return Plan(Path('sweep.yaml'), changes, {'scenario': over, 'dimensions': dimensions})
@@ -53,7 +56,7 @@ def _plan(name: str | Path | Mapping, scenario: str | Path, changes: dict[str, A
 def sweep(
     name: str | Path | Mapping[str, Iterable[Any]],
     *,
-    scenario: str | Path = DEFAULT_SCENARIO,
+    scenario: str | Path | None = None,
     set: Mapping[str, Any] | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -72,8 +75,8 @@ def sweep(
         Sweep by name, path of its YAML file, or values by the dotted name of a scenario field,
         such as ``{'current.speed_kn': [0.0, 0.5]}``. Its dimensions are then called like the
         fields with ``_`` for ``.``: ``current_speed_kn``.
-    scenario : str or Path
-        What a mapping is flown over; a sweep file says it itself.
+    scenario : str or Path, optional
+        What a mapping is flown over, by default ``current_8deg``; a sweep file says it itself.
     set : mapping, optional
         Scenario fields of every flight, by dotted name.
     workers : int, optional
@@ -98,6 +101,8 @@ def sweep(
     ConfigurationError
         Naming file, field, value and allowed range.
     """
+    if workers is not None and not (isinstance(workers, Integral) and workers >= 1):
+        raise ConfigurationError(f'workers = {shown(workers)}: not usable (allowed: 1 and more)')
     plan = _plan(name, scenario, dict(set or {}))
     bar = counter('flying', plan.cells) if progress else nullcontext(lambda done: None)
     with nullcontext(out) if out is not None else TemporaryDirectory() as place:
