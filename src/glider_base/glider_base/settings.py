@@ -67,16 +67,12 @@ def derived(params: type[ParamsT], settings: Settings, **computed: Any) -> Param
 def named(file: str, info: pydantic.ValidationInfo) -> Path:
     """A file beside the file of the settings, if that is known and has it, or else from here."""
     there = Path((info.context or {}).get('folder', '')) / file
-    return there if there.exists() else Path(file)
+    return there if there.exists() or not Path(file).exists() else Path(file)
 
 
 def beside(file: str, info: pydantic.ValidationInfo) -> str:
-    """The same as a full path, for a node that is started elsewhere, where a folder is known.
-
-    One that is not there is called as it was given.
-    """
-    found = named(file, info)
-    return str(found.resolve()) if file and info.context and found.exists() else file
+    """The same as a full path, for a node that is started elsewhere, where a folder is known."""
+    return str(named(file, info).resolve()) if file and info.context else file
 
 
 #: ``json_schema_extra`` of a field that can be set on a node while it flies.
