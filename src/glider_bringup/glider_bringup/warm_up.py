@@ -15,13 +15,16 @@ import numpy as np
 
 import glider_bringup
 from glider_base.kernels.cache import forget_old
-from glider_base.signals import TICK_S
-from glider_base.wiring import at_rest
+from glider_base.signals import TICK_S, Battery
+from glider_base.wiring import WHEN_SILENT, at_rest
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.score import Scorer
 from glider_bringup.scoring.traces import halve, make_tracer
+from glider_guard.ascent import Rise, come_up
+from glider_guidance.path.curve import path_length, path_tangent
+from glider_guidance.status import status_of
 from glider_mission.blocks import BLOCKS, ROW
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.recorded_run import Recording
@@ -64,18 +67,22 @@ def fly_one_tick() -> None:
 
 
 def score_nothing() -> None:
-    """Score a flight that has none, make its traces; and a trim.
+    """Score a flight that has none, make its traces; a trim, and what nodes call beside a tick.
 
     Of two ticks: columns of one row are another kind of array.
     """
     scenario = load_scenario()
+    state, params = mission_of(scenario)
     log = np.zeros((2, ROW))
     scorer = Scorer()
     scorer.add(log)
     scorer.result(Rules())
     make_tracer(scenario).add(log)
     halve(np.zeros(4, np.float32))
-    solve_trim(mission_of(scenario)[1].plant.vehicle, 0.4, pitch_deg=-30.0)
+    solve_trim(params.plant.vehicle, 0.4, pitch_deg=-30.0)
+    path_tangent(path_length(params.guidance.path), params.guidance.path)
+    status_of(state.guidance, params.guidance, Battery(*WHEN_SILENT['battery']))
+    come_up(state.guard.ascent, Rise(0.0, 0.0), params.guard.ascent, TICK_S)
 
 
 def fly_for_notebooks() -> None:

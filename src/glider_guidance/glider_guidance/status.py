@@ -74,10 +74,11 @@ def _dive_s(params: ProfileParams) -> float:
 
 def _to_surface_s(state: ProfileState, depth: float, params: ProfileParams) -> float:
     """Time until the vehicle is at the surface by plan (s); infinite if it is not to come up."""
+    goes_down = is_descending(state.stage) and not (params.holds or state.aborted)
     if is_surfaced(state.stage):
         return 0.0
     way_m = depth
-    if is_descending(state.stage) and not (params.holds or state.aborted):
+    if goes_down:
         way_m = 2.0 * max(depth, state.turn_depth) - depth
     this_s = way_m / params.glide_rate + (params.lead_s if way_m > depth else 0.0)
     if params.holds or state.aborted:

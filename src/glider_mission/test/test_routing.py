@@ -222,9 +222,11 @@ def test_a_mission_that_is_too_short_is_not_reachable():
     assert made.wh is None
 
 
-def test_a_helix_is_not_planned_along_a_chord():
+def test_a_helix_is_not_planned_along_a_chord_nor_a_path_that_is_followed_down_as_dives():
     with pytest.raises(ConfigurationError, match='path.kind = helix: no legs'):
         plan(load_scenario('helix'))
+    with pytest.raises(ConfigurationError, match='profile.mode = path: no dives'):
+        plan(load_scenario('spline'))
 
 
 def row_at(place, stage, believed=(0.0, 0.0)):

@@ -51,6 +51,11 @@ class GuidanceNode(BlockNode):
         self.tell_path(0)
         self.start_up()
 
+    def compile_kernels(self) -> None:
+        """Call every kernel once, so that no tick waits for the compiler."""
+        super().compile_kernels()
+        status_of(self.state, self.params, Battery(*WHEN_SILENT['battery']))
+
     def forget(self) -> None:
         """Know nothing, as at the start."""
         super().forget()

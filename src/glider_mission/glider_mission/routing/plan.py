@@ -305,7 +305,7 @@ def with_errors(chart: Chart, error_mps: float, scenario: Scenario) -> Iterator[
 
 
 def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None) -> Plan:
-    """Plan a mission by its forecast; errors as `forecast_of`, and of a helix, which has no legs.
+    """Plan a mission by its forecast; errors as `forecast_of`, and of paths without legs or dives.
 
     ``progress`` gets how many of `MEMBERS` + 1 steps are done.
     """
@@ -313,6 +313,8 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
         raise ConfigurationError(
             'path.kind = helix: no legs to be planned (allowed: straight, waypoints, spline)'
         )
+    if scenario.profile.mode == 'path':
+        raise ConfigurationError('profile.mode = path: no dives to be planned (allowed: yo)')
     scenario = as_dived(scenario)
     pace, end_s = pace_of(scenario), scenario.duration_s
     forecast = forecast_of(scenario, pace.stay)
