@@ -83,7 +83,8 @@ def flown_run(
     as_flown = as_flown or scenario.to_yaml(vehicle=VEHICLE_FILE)
     vehicle = load_vehicle(scenario.vehicle)
     rules = scenario.score_rules(card['sim_time_s'])
-    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules)
+    slow = scenario.unsteered
+    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules, slow)
 
 
 def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) -> FlownRun:

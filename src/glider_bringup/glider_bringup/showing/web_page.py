@@ -93,6 +93,7 @@ class FlownRun(NamedTuple):
     card: dict[str, Any]
     traces: Traces | None  #: None if only the score is wanted
     rules: Rules  #: by which it is scored
+    unsteered: list[str]  #: which glides were too slow to be steered by roll, in words
 
     @property
     def is_rerouted(self) -> bool:
