@@ -74,6 +74,7 @@ def _dive_s(params: ProfileParams) -> float:
 
 def _to_surface_s(state: ProfileState, depth: float, params: ProfileParams) -> float:
     """Time until the vehicle is at the surface by plan (s); infinite if it is not to come up."""
+    # before the surface, so that what is called there once compiles it for a dive
     goes_down = is_descending(state.stage) and not (params.holds or state.aborted)
     if is_surfaced(state.stage):
         return 0.0
