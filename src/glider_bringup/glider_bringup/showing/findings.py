@@ -190,8 +190,8 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         return f'{span(ticks * TICK_S)} ({text} % of the time)'
 
     told = reckoned(card)
-    problems = _how_bad(card, traces)
-    notes = [f'{text[0].upper()}{text[1:]}.' for text in run.unsteered]
+    problems, notes = _how_bad(card, traces), []
+    problems += [f'{text[0].upper()}{text[1:]}.' for text in run.unsteered]
     if told:
         notes += navigation_notes(told, run.scenario.navigation.current != 'none')
     notes += [f'Broken on purpose: {text}.' for text in fault_texts(card)]
