@@ -46,7 +46,6 @@ def main(arguments):
         words = (*LANES[lane], *arguments[2:])
     # logs of flights are kept and forgotten: to give their memory back, page by page, takes time
     os.environ |= {f'MALLOC_{what}_THRESHOLD_': str(1 << 30) for what in ('MMAP', 'TRIM')}
-    os.environ.pop('PYTHONDONTWRITEBYTECODE', None)  # hundreds of processes would read it again
     os.execv(sys.executable, [sys.executable, *words])
 
 
