@@ -31,7 +31,7 @@ from glider_control.stall import leave_stall, watch_stall
 from glider_control.surface import steer, surface_learnt
 from glider_control.vertical_rate import Trim, rate_error, vertical_rate_law
 from glider_model.onboard.attitude_filter import Measured, measure
-from glider_model.onboard.glide_polar import Polar, glide_speed
+from glider_model.onboard.glide_polar import NO_ATTACK, Polar, glide_attacks, glide_speed
 from glider_model.vehicle.rigid_body import GRAVITY
 
 #: Bits of ``ControlOutput.saturation``; REFUSED, and those of `glider_guard.rows`, are others.
@@ -107,10 +107,10 @@ def _saturation(command, limits):
 
 
 @kernel
-def see(measured, reference, joints, last, params):
+def see(measured, reference, joints, last, params, attack=NO_ATTACK):
     """What a law sees, at a reference, of what was taken in."""
     limits = params.allocation
-    speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar)
+    speed, alpha = glide_speed(measured.theta, measured.vertical_rate, params.polar, attack)
     tau_p, tau_q = moments(joints.m_b, joints.x_p, joints.mu, measured.phi, measured.theta, limits)
     return Seen(
         measured=measured,
@@ -162,8 +162,9 @@ def control_step(state, odometry, joints, reference, params, dt):
         command, m_b = params.safe_command, params.safe_command.m_b
     elif taken.gate.seen:
         reference = taken.reference
+        attack, asked = glide_attacks(measured.theta, reference.theta, params.polar)
         m_b, trim = vertical_rate_law(
-            state.trim, measured, reference, joints, is_afloat, params, dt
+            state.trim, measured, reference, joints, is_afloat, params, dt, asked
         )
         stall_s = watch_stall(stall_s, measured, reference, joints.m_b, params, dt)
         if stall_s < 0.0:
@@ -173,7 +174,7 @@ def control_step(state, odometry, joints, reference, params, dt):
             wanted = rest_afloat(m_b, limits)
             tau_p, tau_q = moments(m_b, wanted.x_p, wanted.mu, phi, theta, limits)
         else:
-            seen = see(measured, reference, joints, last, params)
+            seen = see(measured, reference, joints, last, params, attack)
             law, tau_p, tau_q = law_step(law, seen, params.law, dt)
             steering, delta = steer(steering, seen, params.steering, dt)
             mu = allocate_roll(tau_p, phi, theta, limits)

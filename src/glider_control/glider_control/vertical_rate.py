@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from glider_base.kernel import kernel
-from glider_model.onboard.glide_polar import glide_net_heaviness
+from glider_model.onboard.glide_polar import NO_ATTACK, glide_net_heaviness
 
 #: The integrals of the vertical-rate law wait until the pump is this near to where it goes (kg).
 PUMP_ARRIVED_KG = 0.05
@@ -41,7 +41,7 @@ class Trim(NamedTuple):
 
 
 @kernel
-def vertical_rate_law(trim, measured, reference, joints, is_afloat, params, dt):
+def vertical_rate_law(trim, measured, reference, joints, is_afloat, params, dt, attack=NO_ATTACK):
     """Net heaviness (kg) for the reference's vertical rate, and the new integrals.
 
     The glide polar gives the weight of the steady glide. One integral corrects what ballast and
@@ -53,7 +53,7 @@ def vertical_rate_law(trim, measured, reference, joints, is_afloat, params, dt):
     """
     sign = 1.0 if reference.v_d > 0.0 else -1.0
     ballast, drag = trim.ballast, trim.drag
-    glide = glide_net_heaviness(reference.theta, reference.v_d, params.polar)
+    glide = glide_net_heaviness(reference.theta, reference.v_d, params.polar, attack)
     least = (LEAST_DRAG - 1.0) * abs(glide)
     wanted = glide + sign * max(least, drag)
     error = reference.v_d - measured.vertical_rate

@@ -59,6 +59,7 @@ from glider_model.onboard.gate import (
     gate_step,
     is_lost,
 )
+from glider_model.onboard.glide_polar import glide_attacks
 
 #: So many of the last six surfacings end the mission, whose fixes contradict navigation.
 TOO_MANY = 2
@@ -272,7 +273,8 @@ def guard_step(
     theta = pitch_of(x.q_w, x.q_x, x.q_y, x.q_z)
     _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
     sees = not state.told & rows.BLIND
-    led, is_glide = led_rate(state.weight, theta, m_b, params.weight)
+    attack, _ = glide_attacks(theta, theta, params.weight.polar)
+    led, is_glide = led_rate(state.weight, theta, attack, m_b, params.weight)
     shown = Shown(
         raw=heard.depth if params.has_pressure else heard.odometry.p_d,
         odom=x.p_d,
@@ -297,6 +299,7 @@ def guard_step(
     under = witness.depth > SURFACE_M
     glide = Glide(
         theta=theta,
+        attack=attack,
         rate=rate,
         sinking=sinking,
         m_b=m_b,

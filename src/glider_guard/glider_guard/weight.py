@@ -11,7 +11,12 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel
 from glider_guard.rows import TOO_HEAVY
-from glider_model.onboard.glide_polar import Polar, glide_net_heaviness, glide_vertical_rate
+from glider_model.onboard.glide_polar import (
+    Attack,
+    Polar,
+    glide_net_heaviness,
+    glide_vertical_rate,
+)
 
 #: Shallower (rad) or slower (m/s) than this it is no steady glide, nor so near (share) to the
 #: shallowest one that there is, where a little pitch makes all the difference.
@@ -80,6 +85,7 @@ class Glide(NamedTuple):
     """What a tick shows of it."""
 
     theta: float  #: pitch (rad)
+    attack: Attack
     #: vertical rate of odom (m/s, + down), which shows way over ground where an attitude is off
     rate: float
     sinking: float  #: that of the depth, which may be noise (m/s, + down)
@@ -130,14 +136,14 @@ def sinks_on_m(rate, weight, m_b, is_pumped, limits):
 
 
 @kernel
-def led_rate(state, theta, m_b, limits):
+def led_rate(state, theta, attack, m_b, limits):
     """Vertical rate (m/s, + down) of the steady glide that pitch (rad) and pump (kg) make.
 
     Down for a vehicle that is heavy, up for one that is light, wherever its nose points; and
     whether it points there: a glide.
     """
     weight = m_b + limits.ballast + state.off
-    rate = abs(glide_vertical_rate(theta, weight, limits.polar))
+    rate = abs(glide_vertical_rate(theta, weight, limits.polar, attack))
     is_glide = abs(theta) > LEAST_PITCH and theta * weight < 0.0
     return (rate if weight > 0.0 else -rate), is_glide
 
@@ -181,10 +187,10 @@ def weigh(state: Weight, at: Glide, limits: WeightLimits, dt: float) -> tuple[We
     sinks = state.sinking + dt / SOON_S * (at.sinking - state.sinking)
     if glides_s > SOON_S and abs(mean) > LEAST_RATE:
         known = at.m_b + limits.ballast
-        glides = glide_net_heaviness(at.theta, mean, limits.polar)
+        glides = glide_net_heaviness(at.theta, mean, limits.polar, at.attack)
         more, shown = glides - known, glides
         if sinks < mean:
-            shown = glide_net_heaviness(at.theta, sinks, limits.polar)
+            shown = glide_net_heaviness(at.theta, sinks, limits.polar, at.attack)
         least += (dt / limits.average_s) * (shown + min(0.0, shown) - known - least)
         off += (dt / limits.average_s) * (more - off)
         soon += (dt / SOON_S) * (more - soon)

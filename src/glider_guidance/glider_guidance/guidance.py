@@ -60,6 +60,7 @@ from glider_model.onboard.glide_polar import (
     MODEL_VERTICAL_RATE,
     Polar,
     glide_alpha,
+    glide_attacks,
     glide_horizontal_speed,
     glide_speed,
     glide_vertical_rate,
@@ -350,16 +351,14 @@ def advance(
 
 
 @kernel
-def follow(state, odometry, params, dt):
+def follow(steering, measured, attack, params, dt):
     """Learn what the vehicle can follow: its `Followed` at this tick."""
-    before = state.followed
-    measured = measure(before.measured, odometry, state.tick == 0, ATTITUDE_S, dt)
-    speed, _ = glide_speed(measured.theta, measured.vertical_rate, params.polar)
-    return Followed(measured, learn(before.steering, measured, speed, params.steering, dt))
+    speed, _ = glide_speed(measured.theta, measured.vertical_rate, params.polar, attack)
+    return Followed(measured, learn(steering, measured, speed, params.steering, dt))
 
 
 @kernel
-def observe(state, place, leg, params, dt):
+def observe(state, place, attack, leg, params, dt):
     """Speed through the water and current by the flight model, as far as it holds now."""
     theta, rate = place.theta, place.ground_d
     valid = (
@@ -369,7 +368,7 @@ def observe(state, place, leg, params, dt):
         and abs(rate) > MODEL_VERTICAL_RATE
         and theta * rate < 0.0
     )
-    model_speed = glide_horizontal_speed(theta, rate, params.polar) if valid else 0.0
+    model_speed = glide_horizontal_speed(theta, rate, params.polar, attack) if valid else 0.0
     observer = observer_step(
         state.observer,
         place.ground_n,
@@ -458,8 +457,11 @@ def guidance_step(
     place = locate(state.s, odometry, params)
     profile, doing = advance(state, place, altitude, params, dt)
     progress = watch_progress(state.progress, state.tick, state.s, state.profile.stage, profile)
-    followed = follow(state, odometry, params, dt)
-    water = observe(state.water, place, doing.leg, params, dt)
+    before = state.followed
+    measured = measure(before.measured, odometry, state.tick == 0, ATTITUDE_S, dt)
+    filtered, raw = glide_attacks(measured.theta, place.theta, params.polar)
+    followed = follow(before.steering, measured, filtered, params, dt)
+    water = observe(state.water, place, raw, doing.leg, params, dt)
     current = Water(water.observer.current_n, water.observer.current_e, 0.0)
     dive_s, climb_s = lookaheads(followed.steering, params.steering)
     seen = Situation(

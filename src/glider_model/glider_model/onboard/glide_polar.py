@@ -27,6 +27,15 @@ class Polar(NamedTuple):
     to_the_end: bool  #: whether the angle of attack of a shallow glide is sought to the end
 
 
+class Attack(NamedTuple):
+    """The angle of attack (rad) of every steady glide at a pitch, once it is found."""
+
+    theta: float  #: the pitch (rad)
+    alpha: float
+
+
+#: Not found yet.
+NO_ATTACK = Attack(math.nan, math.nan)
 #: Below this vertical rate (m/s) a vehicle turns over, or floats: its speed is not known.
 MODEL_VERTICAL_RATE = 0.05
 #: Slower than this drag is taken as at this (m/s).
@@ -92,13 +101,15 @@ def _speed_at(steep, alpha, given, is_rate, polar):
 
 
 @kernel
-def _glide_at(steep, given, is_rate, polar):
+def _glide_at(steep, given, is_rate, polar, found):
     """Speed (m/s) and angle of attack (rad) of the steady glide at a pitch (rad).
 
     ``given`` is its vertical rate (m/s), or else its weight in water (N). A speed by a rate has a
     sign if pitch and rate disagree. Where drag changes with the speed each pass betters both.
     Shallower than the polar allows, the angle of the best glide is given, 15 deg at most, or 40.
     """
+    if steep == found.theta:
+        return _speed_at(steep, found.alpha, given, is_rate, polar), found.alpha
     alpha, last, there = 0.0, 0.0, _at_speed(_TYPICAL, polar)
     few = _FEW if polar.n == 0.0 else _FEW_WITH_SPEED
     for number in range(_MANY if polar.to_the_end else few):
@@ -118,7 +129,7 @@ def glide_alpha(theta, polar):
 
     Lift and drag balance a vertical weight: K_D0 + K_D a^2 + (K_L0 + K_L a) tan(theta - a) = 0.
     """
-    return _glide_at(theta, 0.0, True, replace(polar, n=0.0))[1]
+    return _glide_at(theta, 0.0, True, replace(polar, n=0.0), NO_ATTACK)[1]
 
 
 @kernel
@@ -130,6 +141,20 @@ def steepen(theta, polar):
 
 
 @kernel
+def glide_attacks(theta, other, polar):
+    """`Attack` at two pitches (rad), side by side: a processor finds both in the time of one.
+
+    None where drag changes with the speed, or the angle is sought to the end.
+    """
+    if polar.n != 0.0 or polar.to_the_end:
+        return NO_ATTACK, NO_ATTACK
+    one, two, alpha, beta = steepen(theta, polar), steepen(other, polar), 0.0, 0.0
+    for _ in range(_FEW):
+        alpha, beta = _better_alpha(alpha, one, polar), _better_alpha(beta, two, polar)
+    return Attack(one, alpha), Attack(two, beta)
+
+
+@kernel
 def glide_force(alpha, polar):
     """Resultant of lift and drag per V^2 (kg/m); drag as at 1 m/s."""
     drag = polar.K_D0 + polar.K_D * alpha * alpha
@@ -138,29 +163,29 @@ def glide_force(alpha, polar):
 
 
 @kernel
-def glide_vertical_rate(theta, net_heaviness, polar):
+def glide_vertical_rate(theta, net_heaviness, polar, found=NO_ATTACK):
     """Vertical rate (m/s, + down) of the steady glide at a pitch with so much weight (kg)."""
     steep = steepen(theta, polar)
-    speed, alpha = _glide_at(steep, net_heaviness * GRAVITY, False, polar)
+    speed, alpha = _glide_at(steep, net_heaviness * GRAVITY, False, polar, found)
     return -speed * math.sin(steep - alpha)
 
 
 @kernel
-def glide_net_heaviness(theta, vertical_rate, polar):
+def glide_net_heaviness(theta, vertical_rate, polar, found=NO_ATTACK):
     """Net heaviness (kg, + sinks) that a steady glide at this pitch and vertical rate takes."""
     steep = abs(steepen(theta, polar))
     if vertical_rate >= 0.0:
         steep = -steep
-    speed, alpha = _glide_at(steep, vertical_rate, True, polar)
+    speed, alpha = _glide_at(steep, vertical_rate, True, polar, found)
     weight = glide_force(alpha, _at_speed(abs(speed), polar)) * speed * speed / GRAVITY
     return weight if vertical_rate >= 0.0 else -weight
 
 
 @kernel
-def glide_horizontal_speed(theta, vertical_rate, polar):
+def glide_horizontal_speed(theta, vertical_rate, polar, found=NO_ATTACK):
     """Horizontal speed through the water (m/s) from pitch (rad) and vertical rate (m/s)."""
     steep = steepen(theta, polar)
-    _, alpha = _glide_at(steep, vertical_rate, True, polar)
+    _, alpha = _glide_at(steep, vertical_rate, True, polar, found)
     return abs(vertical_rate / math.tan(steep - alpha))
 
 
@@ -171,7 +196,7 @@ def steady_horizontal_speed(theta, net_heaviness, polar):
 
 
 @kernel
-def glide_speed(theta, vertical_rate, polar):
+def glide_speed(theta, vertical_rate, polar, found=NO_ATTACK):
     """Speed through the water (m/s) and angle of attack (rad) from pitch and vertical rate."""
-    speed, alpha = _glide_at(steepen(theta, polar), vertical_rate, True, polar)
+    speed, alpha = _glide_at(steepen(theta, polar), vertical_rate, True, polar, found)
     return abs(speed), alpha

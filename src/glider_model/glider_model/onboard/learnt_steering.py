@@ -257,7 +257,9 @@ def steer_to(state, error, turn, u, ratio, limit, params):
     else:
         if b * c < 0.0:
             most = min(limit, SHARE_OF_PEAK * math.sqrt(-b / (3.0 * c)))
-        _, _, fed = heading_gains(slope_at(state, 0.0) * ratio, k, params)
+        fed = 0.0
+        if turn != 0.0:
+            _, _, fed = heading_gains(slope_at(state, 0.0) * ratio, k, params)
         wanted = (fed * turn - state.d) / ratio
         for _ in range(4):
             trim += (wanted - (b + c * trim * trim) * trim) / slope_at(state, trim * trim)
