@@ -66,7 +66,7 @@ from glider_model.onboard.glide_polar import (
     glide_vertical_rate,
     steepen,
 )
-from glider_model.onboard.learnt_steering import Steering, SteeringParams, learn, lookaheads
+from glider_model.onboard.learnt_steering import Steering, SteeringParams, learn
 
 #: An infeasible course is reported once it has lasted this long (s).
 INFEASIBLE_S = 60.0
@@ -463,7 +463,6 @@ def guidance_step(
     followed = follow(before.steering, measured, filtered, params, dt)
     water = observe(state.water, place, raw, doing.leg, params, dt)
     current = Water(water.observer.current_n, water.observer.current_e, 0.0)
-    dive_s, climb_s = lookaheads(followed.steering, params.steering)
     seen = Situation(
         course=place.course,
         elevation=place.elevation,
@@ -475,8 +474,7 @@ def guidance_step(
         glide_speed=params.profile_speed,
         current=current,
         steering=followed.steering,
-        dive_s=dive_s,
-        climb_s=climb_s,
+        turning=params.steering,
         leg=doing.leg,
         heading=state.commanded.heading_command,
     )

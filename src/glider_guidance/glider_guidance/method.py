@@ -14,7 +14,7 @@ from pydantic import Field
 from glider_base.settings import Settings, number, positive
 from glider_base.signals import TrackingError, Water
 from glider_base.slot import returns, slot
-from glider_model.onboard.learnt_steering import Steering
+from glider_model.onboard.learnt_steering import Steering, SteeringParams
 from glider_model.vehicle.file import Vehicle
 
 
@@ -87,8 +87,7 @@ class Situation(NamedTuple):
     glide_speed: float  #: that of the steady glide to come, by the flight model (m/s)
     current: Water  #: estimated (m/s)
     steering: Steering  #: what is known of how the vehicle turns
-    dive_s: float  #: how far ahead it can follow in a dive (s)
-    climb_s: float  #: and in a climb
+    turning: SteeringParams  #: with that, how far ahead it can follow: `lookahead`
     leg: Leg
     heading: float  #: that was asked for last
 

@@ -19,6 +19,7 @@ from glider_model.vehicle.file import load_vehicle
 DT = 0.5
 SETTINGS = AlosSettings()
 PARAMS = SETTINGS.params(LosGains(), load_vehicle('zhang2021'))
+TURNING = SteeringLearningSettings().params(load_vehicle('zhang2021').params())
 
 
 def step(state, e2, course=0.0, is_gliding=True, heading=0.0):
@@ -34,8 +35,7 @@ def step(state, e2, course=0.0, is_gliding=True, heading=0.0):
         glide_speed=0.4,
         current=Water(0.0, 0.0, 0.0),
         steering=SteeringLearningSettings().initial_state(),
-        dive_s=100.0,
-        climb_s=100.0,
+        turning=TURNING,
         leg=Leg(
             stage=2,
             descends=True,

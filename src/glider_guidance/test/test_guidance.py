@@ -24,7 +24,7 @@ from glider_guidance.yo.stage import (
     SURFACING,
 )
 from glider_model.onboard.glide_polar import glide_horizontal_speed
-from glider_model.onboard.learnt_steering import SteeringLearningSettings, lookaheads
+from glider_model.onboard.learnt_steering import SteeringLearningSettings, lookahead
 
 quick = settings(max_examples=25)
 
@@ -399,7 +399,7 @@ def test_vehicle_that_steers_weakly_approaches_by_a_smaller_angle():
         for _ in range(500):
             state, output = guidance_step(state, odometry, NO_ECHO, params, TICK_S)
         headings[name] = output.reference.psi
-        dive_s[name], _ = lookaheads(state.followed.steering, params.steering)
+        dive_s[name] = lookahead(state.followed.steering, True, params.steering)
     assert headings['none'] < -0.2
     assert dive_s['dive'] > 1.5 * dive_s['none'] == 1.5 * dive_s['climb']
     assert headings['none'] < 1.2 * headings['dive'] < 0.0

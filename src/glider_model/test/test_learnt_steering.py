@@ -20,7 +20,7 @@ from glider_model.onboard.learnt_steering import (
     heading_gains,
     learn,
     learn_steering,
-    lookaheads,
+    lookahead,
     slope_at,
     steer_to,
 )
@@ -285,7 +285,7 @@ def test_a_weaker_vehicle_is_looked_further_ahead_for(b, k):
 
 def test_lookaheads_are_those_of_the_phases():
     steering = SETTINGS.initial_state()._replace(climb=known(-1e-3, 0.0, 0.3))
-    dive_s, climb_s = lookaheads(steering, PARAMS)
+    dive_s, climb_s = (lookahead(steering, down, PARAMS) for down in (True, False))
     assert climb_s > 2.0 * dive_s
 
 

@@ -10,7 +10,7 @@ from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.card import fly_scored
 from glider_mission.blocks import ROW
-from glider_model.onboard.learnt_steering import lookaheads
+from glider_model.onboard.learnt_steering import lookahead
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.perturb import PerturbSettings, perturbed
 from glider_studies.montecarlo import airframe, judge, make_scenarios, sample_plant
@@ -62,6 +62,7 @@ def test_guidance_looks_further_ahead_for_the_weak_only(seed, is_weak):
     log, is_over = np.empty((50000, ROW)), False
     while not is_over:
         state, _, is_over = fly(state, params, log, TICK_S)
-    dive_s, climb_s = lookaheads(state.guidance.followed.steering, params.guidance.steering)
+    steering, turning = state.guidance.followed.steering, params.guidance.steering
+    dive_s, climb_s = (lookahead(steering, down, turning) for down in (True, False))
     assert climb_s < 150.0
     assert (200.0 < dive_s < 600.0) if is_weak else dive_s < 150.0

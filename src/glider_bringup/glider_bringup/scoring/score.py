@@ -20,9 +20,10 @@ import numpy as np
 from glider_base.frames import (
     OriginSettings,
     euler_from_quaternion,
+    heading_of,
     odometry_from_wire,
+    pitch_of,
     poses_from_wire,
-    reference_from_wire,
 )
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Odometry
@@ -89,10 +90,14 @@ def _series_of(log, told):
     for k in range(len(log)):
         row, joints = log[k], log[k, _FIRST_JOINT:]
         x = odometry_from_wire(row[_FIRST_ODOM:])
-        wanted = reference_from_wire(row[_FIRST_REFERENCE:])
-        _, pitch, heading = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
-        motion = (x.p_d, row[_E2], told[k, _E2], pitch, wanted.theta, heading)
-        asked = (wanted.v_d, wanted.p_n, wanted.p_e, row[_INFEASIBLE])
+        wanted = odometry_from_wire(row[_FIRST_REFERENCE:])  # but velocities are over ground
+        pitch, heading = (
+            pitch_of(x.q_w, x.q_x, x.q_y, x.q_z),
+            heading_of(x.q_w, x.q_x, x.q_y, x.q_z),
+        )
+        theta = pitch_of(wanted.q_w, wanted.q_x, wanted.q_y, wanted.q_z)
+        motion = (x.p_d, row[_E2], told[k, _E2], pitch, theta, heading)
+        asked = (wanted.w, wanted.p_n, wanted.p_e, row[_INFEASIBLE])
         bits = (row[_GUARD], float(int(row[_SATURATION]) | int(row[_GUARD])))
         values = motion + asked + bits + (joints[0], joints[1], joints[2], joints[3])
         for i in range(len(values)):

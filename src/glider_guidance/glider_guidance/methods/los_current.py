@@ -14,7 +14,7 @@ from glider_base.kernel import kernel
 from glider_guidance.los import approach_angles, approach_heading, crab_heading, desired_direction
 from glider_guidance.method import Asked, LosGains, MethodSettings, method_step
 from glider_guidance.yo.turns import turn_offset
-from glider_model.onboard.learnt_steering import WELL_S
+from glider_model.onboard.learnt_steering import WELL_S, lookahead
 from glider_model.vehicle.file import Vehicle
 
 #: Of the drift of a turn this part is made up for before it, and as much after it; of the lag
@@ -65,11 +65,11 @@ def cross_track(before, seen, dt):
 
 
 @kernel
-def lead_turns(drift, seen, lookahead_s, next_s):
+def lead_turns(drift, seen, lookahead_s):
     """Drift (m) of the last turn, and where the desired track lies for the sake of the turns.
 
     That is its offset (m, + to starboard), and whether the glide is nearly over: the vehicle turns
-    to the heading of the next one. The lookaheads (s) are those of this phase and of the next one.
+    to the heading of the next one.
     """
     leg, current = seen.leg, seen.current
     across = current.v_e * math.cos(seen.course) - current.v_n * math.sin(seen.course)
@@ -82,7 +82,10 @@ def lead_turns(drift, seen, lookahead_s, next_s):
     coming, past = TURN_SHARE * across * leg.lead_s, TURN_SHARE * drift
     offset = turn_offset(leg.to_turn_s, leg.glided_s, coming, past)
     moved = turn_offset(leg.to_turn_s - 1.0, leg.glided_s + 1.0, coming, past) - offset
-    ready_s = READY_S * (1.0 - WELL_S / next_s)
+    ready_s = READY_S
+    if leg.to_turn_s < ready_s:
+        next_s = lookahead(seen.steering, not leg.descends, seen.turning)
+        ready_s = READY_S * (1.0 - WELL_S / next_s)
     return drift, offset + OFFSET_AHEAD * lookahead_s * moved, leg.to_turn_s < ready_s
 
 
@@ -93,17 +96,15 @@ def los_current_step(state, seen, params, dt):
     leg, current, course = seen.leg, seen.current, seen.course
     # a turn-over is flown on the heading of the glide to come, as it should be
     speed = seen.glide_speed if leg.begins_to_turn_over else seen.speed
-    lookahead_s, next_s = seen.dive_s, seen.climb_s
-    if not leg.descends:
-        lookahead_s, next_s = next_s, lookahead_s
+    lookahead_s = lookahead(seen.steering, leg.descends, seen.turning)
     over_ground = math.sqrt(seen.ground_n * seen.ground_n + seen.ground_e * seen.ground_e)
-    lookahead = max(params.lookahead, lookahead_s * over_ground)
+    ahead_m = max(params.lookahead, lookahead_s * over_ground)
     drift, offset, is_nearly_over = state.drift, 0.0, False
     if params.leads and not seen.follows_path:
-        drift, offset, is_nearly_over = lead_turns(drift, seen, lookahead_s, next_s)
+        drift, offset, is_nearly_over = lead_turns(drift, seen, lookahead_s)
     beside = cross_track(state.beside, seen, dt)
     e2, e3 = beside - offset, seen.error.e3
-    gamma_r, rho_r = approach_angles(e2, e3, lookahead, params.vertical_ratio)
+    gamma_r, rho_r = approach_angles(e2, e3, ahead_m, params.vertical_ratio)
     desired, elevation = desired_direction(course, seen.elevation, gamma_r, rho_r)
     _, progress, feasible = crab_heading(course, speed, current.v_n, current.v_e)
     if is_nearly_over or leg.begins_to_turn_over:

@@ -35,7 +35,7 @@ class Attack(NamedTuple):
 
 
 #: Not found yet.
-NO_ATTACK = Attack(math.nan, math.nan)
+NO_ATTACK = Attack(math.inf, 0.0)
 #: Below this vertical rate (m/s) a vehicle turns over, or floats: its speed is not known.
 MODEL_VERTICAL_RATE = 0.05
 #: Slower than this drag is taken as at this (m/s).

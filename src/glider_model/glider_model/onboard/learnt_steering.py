@@ -257,9 +257,7 @@ def steer_to(state, error, turn, u, ratio, limit, params):
     else:
         if b * c < 0.0:
             most = min(limit, SHARE_OF_PEAK * math.sqrt(-b / (3.0 * c)))
-        fed = 0.0
-        if turn != 0.0:
-            _, _, fed = heading_gains(slope_at(state, 0.0) * ratio, k, params)
+        fed = heading_gains(slope_at(state, 0.0) * ratio, k, params)[2] if turn != 0.0 else 0.0
         wanted = (fed * turn - state.d) / ratio
         for _ in range(4):
             trim += (wanted - (b + c * trim * trim) * trim) / slope_at(state, trim * trim)
@@ -272,8 +270,7 @@ def steer_to(state, error, turn, u, ratio, limit, params):
 
 
 @kernel
-def lookaheads(steering, params):
-    """How far ahead the vehicle can follow, in dive and climb (s)."""
-    _, dive_s = steer_to(steering.dive, 0.0, 0.0, 0.0, steering.ratio, params.bank, params)
-    _, climb_s = steer_to(steering.climb, 0.0, 0.0, 0.0, steering.ratio, params.bank, params)
-    return dive_s, climb_s
+def lookahead(steering, down, params):
+    """How far ahead (s) the vehicle can follow in a dive, or in a climb."""
+    phase = steering.dive if down else steering.climb
+    return steer_to(phase, 0.0, 0.0, 0.0, steering.ratio, params.bank, params)[1]

@@ -32,7 +32,6 @@ from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.onboard.command_filter import Filtered
-from glider_model.onboard.learnt_steering import lookaheads
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.steering import STEERING_SPEED
 from glider_studies.bounds.steering_loop import SteeringLoop
@@ -232,7 +231,6 @@ def _heading(glide: Glide, beside: float) -> float:
         lead_before_s=0.0,
         to_turn_s=math.inf,
     )
-    dive_s, climb_s = lookaheads(guidance.followed.steering, params.guidance.steering)
     seen = Situation(
         course=psi,
         elevation=0.0,
@@ -244,8 +242,7 @@ def _heading(glide: Glide, beside: float) -> float:
         glide_speed=params.guidance.profile_speed,
         current=Water(0.0, 0.0, 0.0),
         steering=guidance.followed.steering,
-        dive_s=dive_s,
-        climb_s=climb_s,
+        turning=params.guidance.steering,
         leg=leg,
         heading=psi,
     )
