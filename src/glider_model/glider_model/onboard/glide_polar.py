@@ -34,7 +34,7 @@ class Attack(NamedTuple):
     alpha: float
 
 
-#: Not found yet.
+#: Not found yet. A default that is not equal to itself (NaN) each process would compile anew.
 NO_ATTACK = Attack(math.inf, 0.0)
 #: Below this vertical rate (m/s) a vehicle turns over, or floats: its speed is not known.
 MODEL_VERTICAL_RATE = 0.05
