@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from glider_model.onboard.glide_polar import (
     LARGEST_ALPHA,
     glide_alpha,
+    glide_attacks,
     glide_force,
     glide_horizontal_speed,
     glide_net_heaviness,
@@ -168,6 +169,24 @@ def test_shallow_glides_are_sought_until_forces_balance(name, pitch, phase):
     slope = math.tan(theta - alpha)
     if (polar.K_L * slope) ** 2 > 4.1 * polar.K_D * (polar.K_D0 + polar.K_L0 * slope):
         assert drag + lift * slope == pytest.approx(0.0, abs=0.03 * drag)
+
+
+@quick
+@given(
+    st.sampled_from([*VEHICLES, 'seaglider', 'slocum_g2']),
+    st.booleans(),
+    st.tuples(*(2 * [st.floats(-1.5, 1.5)])),
+    st.floats(-1.0, 1.0),
+)
+def test_what_is_found_beforehand_is_what_would_be_found(name, to_the_end, pitches, number):
+    """To the last bit, at the pitch that it is of and at any other."""
+    polar = make_polar(load_vehicle(name).params(), to_the_end)
+    ways = (glide_vertical_rate, glide_net_heaviness, glide_horizontal_speed, glide_speed)
+    for found in glide_attacks(*pitches, polar):
+        assert math.isinf(found.theta) is (to_the_end or polar.n != 0.0)
+        for theta in pitches:
+            for way in ways:
+                assert way(theta, number, polar, found) == way(theta, number, polar)
 
 
 def test_linear_drag_is_taken_at_half_a_metre_per_second():
