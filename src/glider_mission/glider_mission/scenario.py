@@ -600,6 +600,8 @@ def _check_glide(scenario: Scenario) -> None:
             f'orders.{moved[0]}.path: not with a route that is planned anew, which leads back to '
             "the path of the mission (allowed: guidance.replan = 'never')"
         )
+    if scenario.forecast.file and not is_file(Path(scenario.forecast.file)):
+        raise ConfigurationError(f'forecast.file = {scenario.forecast.file!r}: no such file')
     scenario.water.check_stable()
     PlantSettings(vehicle=scenario.vehicle, initial=scenario.initial).check()
     start_m, bottom_m = scenario.initial.depth_m, scenario.water.bottom_m

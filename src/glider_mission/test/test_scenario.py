@@ -162,6 +162,7 @@ UNKNOWN = [
     ({'current': {'seed': 4}}, None, ['seed belongs to the scenario']),
     ({'vehicle': 'submarine'}, None, ["vehicle = 'submarine'", 'zhang2021', 'seawing']),
     ({'vehicle': 'mine.yaml'}, None, ['mine.yaml', 'no such vehicle file']),
+    ({'forecast': {'file': 'no.nc'}}, None, ['forecast.file = ', 'no.nc', 'no such file']),
     ({}, {'current.speed_kn': -1.0}, ['current.speed_kn = -1.0', '>= 0']),
     ({}, {'profile.depth': 5.0}, ['profile.depth = 5.0', 'unknown field', 'depth_m']),
     ({'profile': {}}, {'profile.depth_m.x': 1.0}, ['profile.depth_m.x']),
