@@ -14,6 +14,7 @@ import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from rosbags.highlevel import AnyReader
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from typer.testing import CliRunner
 
 from command_line import glider
@@ -37,6 +38,21 @@ def file_of(folder: Path) -> Path:
 def chunks_of(file: Path) -> list:
     with file.open('rb') as stream:
         return make_reader(stream).get_summary().chunk_indexes
+
+
+def rewrite(bag: Path, folder: Path, storage: StoragePlugin) -> None:
+    """Write the first second of a bag with rosbags; in MCAP each message is compressed."""
+    with AnyReader([bag]) as reader:
+        writer = Writer(folder, version=9, storage_plugin=storage)
+        if storage == StoragePlugin.MCAP:
+            writer.set_compression(CompressionMode.MESSAGE, CompressionFormat.ZSTD)
+        with writer:
+            into = {
+                one.id: writer.add_connection(one.topic, one.msgtype, typestore=reader.typestore)
+                for one in reader.connections
+            }
+            for connection, stamp_ns, raw in reader.messages(stop=1_000_000_000):
+                writer.write(into[connection.id], stamp_ns, raw)
 
 
 @pytest.fixture
@@ -133,6 +149,36 @@ def test_metadata_alone_is_made_anew(short_run, tmp_path, text):
     assert recover(folder)['rebuilt'] == ['metadata.yaml']
     for name in ('metadata.yaml', file_of(folder).name):
         assert (folder / name).read_bytes() == (short_run / name).read_bytes()
+
+
+@pytest.mark.parametrize('kind', ['compressed messages', 'sqlite3', 'a file is missing'])
+def test_metadata_that_tells_more_than_the_files_is_kept(short_run, tmp_path, kind):
+    """Without it nobody knows that messages are compressed, or that a file belongs to the bag."""
+    folder = tmp_path / 'run'
+    if kind == 'a file is missing':
+        shutil.copytree(short_run, folder)
+        metadata = folder / 'metadata.yaml'
+        metadata.write_text(metadata.read_text().replace('_0.mcap', '_1.mcap'))
+    else:
+        is_sql = kind == 'sqlite3'
+        rewrite(short_run, folder, StoragePlugin.SQLITE3 if is_sql else StoragePlugin.MCAP)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    words = {'sqlite3': 'storage sqlite3', 'compressed messages': 'compressed with zstd'}
+    used = ['recover'] if kind == 'a file is missing' else ['recover', 'score', 'report']
+    for command in used:
+        done = CliRunner().invoke(app, [command, str(folder)])
+        assert isinstance(done.exception, ConfigurationError)
+        assert words.get(kind, 'missing; ') in str(done.exception)
+    assert before == {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_compressed_messages_without_metadata_are_no_run_of_nothing(short_run, tmp_path):
+    rewrite(short_run, tmp_path / 'bag', StoragePlugin.MCAP)
+    for name in ('scenario.yaml', 'vehicle.yaml'):
+        shutil.copy(short_run / name, tmp_path / 'bag')
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    with pytest.raises(ConfigurationError, match=r'bag: cannot be scored: tick 0 .* lacks '):
+        score_again(tmp_path / 'bag')
 
 
 def test_part_that_the_disk_never_got_is_told(short_run, cut_run):

@@ -61,10 +61,11 @@ def score_bag(
         cut = 'the recording was stopped before the run was complete'
         reason = '' if complete else log.end.message if log.end else cut
     lost = log.lost(complete)
-    if not log.ticks and (lost or missing):
+    untold = not (old or log.end) and any(log.recorded().values())
+    if not log.ticks and (lost or missing or untold):
         why = bag.cut or (
-            'its first tick is not complete, as in a free-running recording (allowed: runs in '
-            'lockstep, with every message of every tick)'
+            f'{log.lacks}, as in a free-running recording (allowed: runs in lockstep, with every '
+            'message of every tick)'
         )
         raise ConfigurationError(f'{run}: cannot be scored: {why}')
     if missing and (complete or not old or log.ticks < old['ticks']):

@@ -14,7 +14,7 @@ from glider_base.settings import ConfigurationError, mistakes
 from glider_bringup.engines.flight import Outcome, Taker, fly
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.disk import write_whole
-from glider_mission.recording.bag_files import has_bag
+from glider_mission.recording.bag_files import METADATA_FILE, bag_files, has_bag
 from glider_mission.run_folder import SCORE_FILE
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
@@ -211,6 +211,8 @@ def read_score(run: Path) -> dict:
         if not run.exists():
             raise ConfigurationError(f'{run}: no such run folder or .mcap file')
         if not has_bag(run):
+            if (run / METADATA_FILE).is_file():
+                bag_files(run)  # says which storage is not read, or which file is missing
             raise ConfigurationError(
                 f'{run}: not a run folder, it has neither a bag (.mcap) nor a {SCORE_FILE}'
             )

@@ -18,6 +18,10 @@ METADATA_FILE = 'metadata.yaml'
 ROSBAG2 = 'rosbag2'
 
 
+class OtherFilesError(ConfigurationError):
+    """What a sound metadata.yaml tells of is stored in another way, or missing."""
+
+
 def bag_files(path: Path) -> list[Path]:
     """MCAP files of a bag, in the order in which they were written.
 
@@ -37,7 +41,7 @@ def bag_files(path: Path) -> list[Path]:
         )
     for file in files:
         if not file.is_file():
-            raise ConfigurationError(f'{file}: missing; {path / METADATA_FILE} lists it')
+            raise OtherFilesError(f'{file}: missing; {path / METADATA_FILE} lists it')
     return files
 
 
@@ -55,7 +59,7 @@ def _listed_files(metadata: Path) -> list[Path]:
         raise ConfigurationError(f'{metadata}: not metadata of rosbag2: {error!r}') from None
     if storage != 'mcap' or compression:
         what = f'files compressed with {compression}' if compression else f'storage {storage}'
-        raise ConfigurationError(
+        raise OtherFilesError(
             f'{metadata}: {what} (allowed: storage mcap, compressed in chunks or not at all; '
             f'ros2 bag convert makes one)'
         )

@@ -22,6 +22,7 @@ from glider_mission.recording import mcap_records as records
 from glider_mission.recording.bag_files import (
     METADATA_FILE,
     ROSBAG2,
+    OtherFilesError,
     bag_files,
     metadata_text,
     topic_counts,
@@ -82,6 +83,8 @@ def _files(path: Path) -> tuple[list[Path], bool]:
     """Files of a bag, and whether its metadata.yaml lists them."""
     try:
         return bag_files(path), path.is_file() or (path / METADATA_FILE).is_file()
+    except OtherFilesError:
+        raise  # what it tells is to be found nowhere else
     except ConfigurationError:
         files = sorted(path.glob('*.mcap')) if path.is_dir() else []
         if not files:

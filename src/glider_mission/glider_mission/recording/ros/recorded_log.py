@@ -126,7 +126,7 @@ class RecordedLog:
         #: Tick, column and new value, in the order in which they were told.
         self._flags: list[tuple[int, str, float]] = []
         self._unusable: dict[tuple[str, int], str] = {}
-        self._lacks = ''
+        self.lacks = ''  #: or what the first tick lacks that is not whole, in words
         self._log = np.empty((2 * BLOCK_TICKS, ROW))
         self._begun = 0  #: rows in use: NaN but for what was put there
         self._start, self._over = 0, False
@@ -209,7 +209,7 @@ class RecordedLog:
         missing = np.flatnonzero(np.any(np.isnan(numbers), axis=1))
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         if len(missing):
-            self._over, self._lacks = True, self._what_lacks(rows)
+            self._over, self.lacks = True, self._what_lacks(rows)
         block[:, [COLUMNS[name] for name in _FLAGS if name != 'stage']] = 0.0
         for tick, column, value in self._flags:
             block[max(0, tick - self._start) :, COLUMNS[column]] = value
@@ -239,7 +239,7 @@ class RecordedLog:
         told = [self._bag.cut] if self._bag.cut else []
         if ticks is not None and self.ticks < ticks - unsure:
             told.append(f'{self.ticks:,} of {ticks:,} ticks are there')
-            told += [] if self._bag.cut else [self._lacks]
+            told += [] if self._bag.cut else [self.lacks]
         return '; '.join(told)
 
     def lost(self, complete: bool) -> int:
