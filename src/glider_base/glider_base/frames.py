@@ -82,8 +82,8 @@ def euler_from_quaternion(q_w, q_x, q_y, q_z):
 
 @kernel
 def pitch_of(q_w, q_x, q_y, q_z):
-    """Pitch (rad) of q_NB alone, held within +-pi/2 against rounding."""
-    return math.asin(min(1.0, max(-1.0, 2.0 * (q_w * q_y - q_z * q_x))))
+    """Pitch (rad) of q_NB alone, held within +-pi/2 against rounding; NaN of a NaN."""
+    return math.asin(min(max(2.0 * (q_w * q_y - q_z * q_x), -1.0), 1.0))
 
 
 @kernel

@@ -310,6 +310,10 @@ def test_poses_of_many_messages_are_those_of_each():
     np.testing.assert_allclose(poses[:, 3:], angles, rtol=0.0, atol=1e-12)
 
 
+def test_what_is_not_recorded_has_no_attitude():
+    assert np.all(np.isnan(poses_from_wire(np.full((1, 7), np.nan))))
+
+
 # ------------------------------------------------------------------------------ on the Earth
 
 
