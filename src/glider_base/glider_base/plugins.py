@@ -29,14 +29,7 @@ CURRENTS, NAVIGATION_METHODS = 'glider.currents', 'glider.navigation_methods'
 SURFACES, SURFACE_LAWS = 'glider.surfaces', 'glider.surface_laws'
 #: Typer applications: commands of ``./glider``.
 COMMANDS = 'glider.commands'
-GROUPS = (
-    CONTROL_LAWS,
-    CURRENTS,
-    GUIDANCE_METHODS,
-    NAVIGATION_METHODS,
-    SURFACE_LAWS,
-    SURFACES,
-)
+GROUPS = (CONTROL_LAWS, CURRENTS, GUIDANCE_METHODS, NAVIGATION_METHODS, SURFACE_LAWS, SURFACES)
 
 #: Variable that says what was told already, so that the processes of a run do not say it again.
 TOLD = 'GLIDER_TOLD'

@@ -191,14 +191,7 @@ PLANT = Wired(
     'plant',
     'glider_model',
     inputs=('command', 'current_velocity', 'drop_weight'),
-    outputs=(
-        '/clock',
-        'ground_truth/odom',
-        *SENSORS,
-        'health',
-        'battery',
-        'joint_states',
-    ),
+    outputs=('/clock', 'ground_truth/odom', *SENSORS, 'health', 'battery', 'joint_states'),
 )
 CURRENT = Wired(
     'current', 'glider_model', inputs=('ground_truth/odom',), outputs=('current_velocity',)

@@ -16,14 +16,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError, installed
 from glider_base.kernel import kernel
-from glider_flights.folders import (
-    LATEST_S,
-    Progress,
-    declination_at,
-    files_in,
-    gsw,
-    of_one_flight,
-)
+from glider_flights.folders import LATEST_S, Progress, declination_at, files_in, gsw, of_one_flight
 from glider_flights.netcdf import PLAUSIBLE, names_of
 from glider_flights.record import (
     NOT_KNOWN,

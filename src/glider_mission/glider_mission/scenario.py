@@ -29,27 +29,14 @@ from glider_base.settings import (
 )
 from glider_base.wiring import SENSORS
 from glider_control.law import LawSettings
-from glider_control.settings import (
-    LAWS,
-    ControlLawSettings,
-    ControlSettings,
-    check_law,
-    with_law,
-)
+from glider_control.settings import LAWS, ControlLawSettings, ControlSettings, check_law, with_law
 from glider_guard.settings import GuardLimitSettings, GuardSettings
 from glider_guidance.order import Order
 from glider_guidance.orders import check_orders
 from glider_guidance.path.settings import MAX_DEPTH_M, PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
-from glider_mission.changes import (
-    VEHICLE,
-    overlap,
-    plain,
-    set_field,
-    split_changes,
-    told_fields,
-)
+from glider_mission.changes import VEHICLE, overlap, plain, set_field, split_changes, told_fields
 from glider_mission.chart import charted, in_metres, uncharted
 from glider_mission.mafiles import from_folder, with_mafiles
 from glider_mission.rules import Rules
@@ -60,13 +47,7 @@ from glider_model.ocean.fields.grid import GridFileSettings
 from glider_model.ocean.grid_file import told_time
 from glider_model.ocean.water import WaterSettings
 from glider_model.onboard.gate import GateSettings
-from glider_model.plant.faults.settings import (
-    FAULTS,
-    Fault,
-    FaultSettings,
-    Message,
-    check_fitted,
-)
+from glider_model.plant.faults.settings import FAULTS, Fault, FaultSettings, Message, check_fitted
 from glider_model.plant.plant import SURFACE_S, InitialSettings, PlantSettings
 from glider_model.plant.sensors import SensorSettings
 from glider_model.vehicle.file import (

@@ -162,9 +162,7 @@ def _validated(node: Node, model: type[SettingsT], leaves, values: dict[str, Any
 
 
 def declare_settings(
-    node: Node,
-    model: type[SettingsT],
-    on_change: Callable[[SettingsT], None] | None = None,
+    node: Node, model: type[SettingsT], on_change: Callable[[SettingsT], None] | None = None
 ) -> SettingsT:
     """Declare the parameters of ``model`` on ``node`` and return the values they were given.
 

@@ -42,8 +42,7 @@ def export(
     out: Annotated[
         Path | None,
         typer.Option(
-            metavar='FILE',
-            help='Default: run.nc, run.csv, run_mafiles ... beside the bag.',
+            metavar='FILE', help='Default: run.nc, run.csv, run_mafiles ... beside the bag.'
         ),
     ] = None,
     start: Annotated[

@@ -111,8 +111,7 @@ def run(
         bool, typer.Option('--view', help='Show the flight live in Foxglove (nodes only).')
     ] = False,
     view_port: Annotated[
-        int | None,
-        typer.Option(min=1, max=65535, help='Port of the live view. Default: 8765.'),
+        int | None, typer.Option(min=1, max=65535, help='Port of the live view. Default: 8765.')
     ] = None,
     as_json: Json = False,
 ) -> None:

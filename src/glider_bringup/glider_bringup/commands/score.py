@@ -13,10 +13,7 @@ app = typer.Typer()
 
 
 @app.command(epilog='Example: ./glider score runs/20260101-120000-current_8deg --json')
-def score(
-    run: Run,
-    as_json: Json = False,
-) -> None:
+def score(run: Run, as_json: Json = False) -> None:
     """Score a run again, from its bag; a run without a bag shows the score it was given."""
     from glider_bringup.scoring.again import score_again
 

@@ -353,11 +353,7 @@ xarray.DataArray.plot = property(_Plot)
 
 def _variables(log: np.ndarray, scenario: Scenario) -> dict[str, tuple]:
     """Every variable: dimension, values, attributes."""
-    return {
-        **_numbers(log, steers_by(scenario)),
-        **_beside(log, scenario),
-        **_flags(log),
-    }
+    return {**_numbers(log, steers_by(scenario)), **_beside(log, scenario), **_flags(log)}
 
 
 def numbers_of(row: np.ndarray, scenario: Scenario) -> dict[str, Any]:

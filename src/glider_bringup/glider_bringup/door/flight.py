@@ -16,11 +16,7 @@ from glider_base.signals import TICK_S
 from glider_bringup.console import compiling
 from glider_bringup.door.run import chosen_scenario
 from glider_bringup.engines.compiling import told
-from glider_bringup.engines.direct import (
-    FlightError,
-    fault_of,
-    finite_rows,
-)
+from glider_bringup.engines.direct import FlightError, fault_of, finite_rows
 from glider_bringup.engines.flight import Held, Kept, refuse_message_faults, refuse_planned_route
 from glider_bringup.scoring.scores import seconds
 from glider_control.law import LawSettings

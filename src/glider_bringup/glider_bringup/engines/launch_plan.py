@@ -29,18 +29,8 @@ from glider_bringup.engines.processes import (
 from glider_control.settings import LAWS
 from glider_guidance.settings import METHODS, OLD_NAMES
 from glider_mission.choices import chosen_fields, number
-from glider_mission.run_folder import (
-    PARAMETERS_FILE,
-    SCENARIO_FILE,
-    VEHICLE_FILE,
-    make_run_folder,
-)
-from glider_mission.scenario import (
-    DEFAULT_SCENARIO,
-    Scenario,
-    load_scenario,
-    scenario_names,
-)
+from glider_mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE, make_run_folder
+from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, scenario_names
 
 #: The node that `ros2 launch` starts and `./glider run`, which nobody can watch, does not.
 TF, TF_MODULE = 'tf_node', 'glider_model.nodes.tf_node'
@@ -208,11 +198,7 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     if record_to:
         parameters[RECORDER]['progress'] = False
     nodes = _nodes(
-        simulate,
-        with_navigation,
-        _TRUTH[text['autopilot']],
-        record_to is not None,
-        with_tf,
+        simulate, with_navigation, _TRUTH[text['autopilot']], record_to is not None, with_tf
     )
     started = [] if lockstep else [node.executable for node in nodes]
     managed = tuple(wired.node for wired in ON_BOARD if wired.node in started)

@@ -26,12 +26,7 @@ from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.log_writer import LogWriter
 from glider_mission.recording.ros.recorded_log import Reader, read_back
 from glider_mission.recording.ros.rosbag2 import BagWriter, Sync
-from glider_mission.run_folder import (
-    LOG_FILE,
-    PARAMETERS_FILE,
-    SCENARIO_FILE,
-    VEHICLE_FILE,
-)
+from glider_mission.run_folder import LOG_FILE, PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
 

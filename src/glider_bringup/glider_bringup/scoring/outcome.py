@@ -51,11 +51,7 @@ def ends_mission(told: np.ndarray) -> np.ndarray:
 
 
 def outcome_of(
-    depth: np.ndarray,
-    told: np.ndarray,
-    hull: tuple[float, float],
-    infeasible: bool,
-    missing: str,
+    depth: np.ndarray, told: np.ndarray, hull: tuple[float, float], infeasible: bool, missing: str
 ) -> tuple[str, str]:
     """What became of a vehicle: its status, and the reason, empty where there is nothing to say.
 

@@ -35,10 +35,7 @@ _PANELS = {
     'heading': (
         'Heading',
         'heading (deg from north)',
-        [
-            ('desired', 'heading_ref_deg', ORANGE, 1.0),
-            ('heading', 'heading_deg', BLUE, 1.0),
-        ],
+        [('desired', 'heading_ref_deg', ORANGE, 1.0), ('heading', 'heading_deg', BLUE, 1.0)],
     ),
     'pitch': (
         'Pitch',

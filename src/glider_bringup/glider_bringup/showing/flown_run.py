@@ -13,12 +13,7 @@ from glider_bringup.showing.web_page import FlownRun
 from glider_guidance.settings import OLD_NAMES
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
-from glider_mission.run_folder import (
-    SCORE_FILE,
-    TRACES_FILE,
-    VEHICLE_FILE,
-    scenario_of,
-)
+from glider_mission.run_folder import SCORE_FILE, TRACES_FILE, VEHICLE_FILE, scenario_of
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import load_vehicle
 

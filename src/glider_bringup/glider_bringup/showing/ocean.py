@@ -208,10 +208,7 @@ def _panels(name: str, seen: Loaded) -> list[Panel]:
         return [Panel(title, 'speed (m/s)', 'Blues', *places, np.hypot(*arrows), arrows)]
     water = np.where(seen.land, np.nan, np.moveaxis(seen.water[0, 0], -1, 0))
     return [
-        Panel(
-            *(f'{one.what} {at}', f'{one.what} ({one.unit})', colours),
-            *(*places, values),
-        )
+        Panel(*(f'{one.what} {at}', f'{one.what} ({one.unit})', colours), *(*places, values))
         for one, colours, values in zip(GRIDS[name], ('viridis', 'Purples'), water, strict=True)
     ]
 

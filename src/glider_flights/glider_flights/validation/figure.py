@@ -7,15 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from glider_bringup.showing.figure import (
-    BLUE,
-    GREEN,
-    GREY,
-    ORANGE,
-    draw_curves,
-    dress,
-    new_figure,
-)
+from glider_bringup.showing.figure import BLUE, GREEN, GREY, ORANGE, draw_curves, dress, new_figure
 from glider_flights.validation.result import Validation
 from glider_mission.disk import save_figure
 

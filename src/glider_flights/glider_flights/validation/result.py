@@ -213,10 +213,7 @@ VEHICLES = {'slocum': 'slocum_g2', 'seaglider': 'seaglider'}
 #: Both ways.
 HALVES = ('first', 'second')
 #: What is told of each.
-OF_HALF = (
-    *('segments', 'fitted', 'w_rmse_cmps', 'w_bias_cmps', 'peer', 'unfitted'),
-    *STEERED_BY,
-)
+OF_HALF = (*('segments', 'fitted', 'w_rmse_cmps', 'w_bias_cmps', 'peer', 'unfitted'), *STEERED_BY)
 
 
 def flights_in(folder: Path) -> list[Path]:

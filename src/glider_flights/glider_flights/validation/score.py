@@ -150,10 +150,7 @@ def _closure(flight: Flight, pairs) -> dict[str, Any]:
             own = row._replace(way_m=way).comparable_mps
             off.append(float(np.hypot(*(own - row.segment.on_board.dac_mps))))
     off = np.array(off, float)
-    return {
-        'median': figure(off, 100.0, np.median),
-        'segments': int(np.isfinite(off).sum()),
-    }
+    return {'median': figure(off, 100.0, np.median), 'segments': int(np.isfinite(off).sum())}
 
 
 def _way(segment: Segment, pairs) -> tuple[np.ndarray, float]:
@@ -211,11 +208,7 @@ def _figures(name: str, found: list[Track], rates: list[np.ndarray]) -> dict[str
     off = np.concatenate(
         [(rate - track.rate_mps)[track.counts] for track, rate in zip(found, rates, strict=True)]
     )
-    return {
-        'name': name,
-        'w_rmse_cmps': rms(off, 100.0),
-        'samples': int(np.isfinite(off).sum()),
-    }
+    return {'name': name, 'w_rmse_cmps': rms(off, 100.0), 'samples': int(np.isfinite(off).sum())}
 
 
 def _gliderflight(

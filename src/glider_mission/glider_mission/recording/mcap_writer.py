@@ -101,10 +101,7 @@ class McapWriter:
         self._chunk += payload
 
     def write_rows(
-        self,
-        channel_ids: Sequence[int],
-        stamps_ns: np.ndarray,
-        payloads: Sequence[np.ndarray],
+        self, channel_ids: Sequence[int], stamps_ns: np.ndarray, payloads: Sequence[np.ndarray]
     ) -> None:
         """Add n messages to each of several channels, interleaved by stamp.
 

@@ -7,13 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from glider_base.frames import (
-    Origin,
-    from_geodetic,
-    on_chart,
-    rotate_to_body,
-    rotate_to_ned,
-)
+from glider_base.frames import Origin, from_geodetic, on_chart, rotate_to_body, rotate_to_ned
 from glider_base.kernel import kernel, replace
 from glider_base.slot import slot
 from glider_model.ocean.field import bracket

@@ -72,11 +72,7 @@ TEMPERATURE_AND_SALINITY = (
     ),
 )
 #: What CF calls a bottom that is a height, and some of what it calls one that is a depth.
-_HEIGHTS = (
-    'height_above_mean_sea_level',
-    'height_above_reference_ellipsoid',
-    'surface_altitude',
-)
+_HEIGHTS = ('height_above_mean_sea_level', 'height_above_reference_ellipsoid', 'surface_altitude')
 _BELOW = ('sea_floor_depth_below_mean_sea_level', 'sea_floor_depth_below_sea_surface')
 #: As GEBCO and CMEMS (``deptho``) write it: without time and depth.
 BOTTOM = (

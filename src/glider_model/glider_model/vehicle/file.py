@@ -15,14 +15,7 @@ from pydantic import Field
 from glider_base import plugins
 from glider_base.errors import told_changes
 from glider_base.files import read_bytes, read_yaml, yaml_line, yaml_text
-from glider_base.settings import (
-    Settings,
-    file_names,
-    find_field,
-    find_file,
-    holder_of,
-    validate,
-)
+from glider_base.settings import Settings, file_names, find_field, find_file, holder_of, validate
 from glider_base.signals import Joints
 from glider_base.wiring import JOINTS
 from glider_model.vehicle import surfaces

@@ -129,11 +129,7 @@ def tick(loop: SteeringLoop, gains: Gains = AS_LEARNT) -> Tick:
     after['psi'] = psi_left + h * (b * u + d)
     change = np.array([after[name] - at[name] for name in states]) / h
     signals = {'heading_rate': pull_h, 'u': command, 'roll_rate': pull_r}
-    return Tick(
-        change[:, :n],
-        change[:, n:],
-        {name: signals[name][:n] for name in limits(loop)},
-    )
+    return Tick(change[:, :n], change[:, n:], {name: signals[name][:n] for name in limits(loop)})
 
 
 def _filtered(value, rate, command, gain, params):

@@ -9,15 +9,7 @@ from typing import Annotated, Literal
 import typer
 
 from glider_base.errors import EXIT_FAILED
-from glider_bringup.console import (
-    Json,
-    Scheduler,
-    Workers,
-    messages,
-    output,
-    picked,
-    repeatable,
-)
+from glider_bringup.console import Json, Scheduler, Workers, messages, output, picked, repeatable
 from glider_mission.disk import write_whole
 from glider_studies.workers import workers_at_work
 
@@ -41,9 +33,7 @@ def experiments(
     seed: Annotated[
         int,
         typer.Option(
-            min=0,
-            max=2**31 - 1,
-            help='Seed of the missions, seas and bottoms that are drawn.',
+            min=0, max=2**31 - 1, help='Seed of the missions, seas and bottoms that are drawn.'
         ),
     ] = 0,
     workers: Workers = None,

@@ -9,13 +9,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from glider_studies.paper.experiments import (
-    PASSED,
-    by_case,
-    compared,
-    described,
-    is_better,
-)
+from glider_studies.paper.experiments import PASSED, by_case, compared, described, is_better
 from glider_studies.paper.judges import figure_of
 
 #: Failed checks that are listed; of more only the number is told.

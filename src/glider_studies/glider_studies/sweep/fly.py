@@ -25,13 +25,7 @@ from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario, ScenarioSource, make_scenario
 from glider_model.vehicle.file import vehicle_path
 from glider_studies.sweep.journal import Journal
-from glider_studies.sweep.netcdf import (
-    NOT_FIGURES,
-    STATUSES,
-    VECTORS,
-    make_dataset,
-    variable_name,
-)
+from glider_studies.sweep.netcdf import NOT_FIGURES, STATUSES, VECTORS, make_dataset, variable_name
 from glider_studies.sweep.plan import Plan, vehicle_digest
 from glider_studies.workers import WORKER_DIED, Pool, Progress, WorkError
 

@@ -22,14 +22,7 @@ from glider_model.vehicle.file import Vehicle, vehicle_path
 from glider_studies.sweep.plan import Plan
 
 #: Units by how names in a scorecard end, in the spelling of UDUNITS.
-_UNITS = {
-    '_mps': 'm/s',
-    '_m': 'm',
-    '_deg': 'degree',
-    '_kg': 'kg',
-    '_s': 's',
-    '_rad': 'rad',
-}
+_UNITS = {'_mps': 'm/s', '_m': 'm', '_deg': 'degree', '_kg': 'kg', '_s': 's', '_rad': 'rad'}
 #: Units of a whole part of a scorecard.
 _PARTS = {'energy': 'W h'}
 #: Units of settings that UDUNITS spells otherwise.

@@ -23,13 +23,7 @@ from pydantic import Field
 
 from glider_base.files import is_file, read_text, read_yaml, yaml_line, yaml_text
 from glider_base.kernel import source_digest
-from glider_base.settings import (
-    ConfigurationError,
-    Settings,
-    file_names,
-    find_file,
-    validate,
-)
+from glider_base.settings import ConfigurationError, Settings, file_names, find_file, validate
 from glider_mission.changes import overlap, run_command
 from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import (

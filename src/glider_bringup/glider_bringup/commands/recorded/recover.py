@@ -17,10 +17,7 @@ app = typer.Typer()
 
 
 @app.command(epilog='Example: ./glider recover runs/20260101-120000-current_8deg')
-def recover(
-    run: Run,
-    as_json: Json = False,
-) -> None:
+def recover(run: Run, as_json: Json = False) -> None:
     """Make a recording whole whose end is missing, and say what is.
 
     A recorder that was killed, or a machine without power, leaves a file without an index and no

@@ -62,11 +62,7 @@ class Plan(NamedTuple):
 
 
 def plan_replay(
-    bag: Bag,
-    topics: list[str],
-    start_s: float,
-    duration_s: float | None,
-    namespace: str | None,
+    bag: Bag, topics: list[str], start_s: float, duration_s: float | None, namespace: str | None
 ) -> Plan:
     """Check what is asked for: part of a recording, from its beginning (s).
 

@@ -58,10 +58,7 @@ def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool
 
 
 def verify(
-    recording: Recording,
-    told: Told,
-    only: list[str],
-    progress: Callable[[str, float], None],
+    recording: Recording, told: Told, only: list[str], progress: Callable[[str, float], None]
 ) -> Iterator[Verdict]:
     """Compare the blocks of a recording, all or only some, in the order in which they act.
 

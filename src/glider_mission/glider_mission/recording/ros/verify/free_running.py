@@ -57,10 +57,7 @@ def free_running(
     check = Check(block, recording, stamps_ns)
     passing = Passing(max_age_s)
     check.passed[:] = [passing.ticks(int(stamp_ns)) for stamp_ns in stamps_ns]
-    outputs = check.tracks(
-        lambda one: _by_stamp(one, stamps_ns),
-        'which belongs to no step',
-    )
+    outputs = check.tracks(lambda one: _by_stamp(one, stamps_ns), 'which belongs to no step')
     start, cuts = 0, check.cuts(len(stamps_ns))
     last = None
     while start < len(stamps_ns):
