@@ -82,7 +82,7 @@ def _mission_s() -> tuple[float, float]:
     """Processor times (s) of a mission and of its score."""
     scenario = load_mission()
     state, params = mission_of(scenario)
-    scorer = Scorer()
+    scorer = Scorer(scenario)
     scoring_s = [0.0]
 
     def fly() -> None:

@@ -74,7 +74,7 @@ def score_nothing() -> None:
     scenario = load_scenario()
     state, params = mission_of(scenario)
     log = np.zeros((2, ROW))
-    scorer = Scorer()
+    scorer = Scorer(scenario)
     scorer.add(log)
     scorer.result(Rules())
     make_tracer(scenario).add(log)

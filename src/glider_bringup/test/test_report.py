@@ -83,7 +83,7 @@ def fly(tmp_path, change=None, stop=False, name='flight', of='current_8deg', **f
     """Fly in this process; ``change`` alters each block of the log, ``stop`` is a Ctrl-C."""
     scenario = load_scenario(of, {**SHORT, **fields})
     folder = make_run_folder(scenario, tmp_path / name)
-    tracer, scorer = make_tracer(scenario), Scorer()
+    tracer, scorer = make_tracer(scenario), Scorer(scenario)
     for log in fly_blocks(*mission_of(scenario)):
         log = log if change is None else change(log.copy())
         tracer.add(log)
@@ -263,7 +263,7 @@ def never_flown(folder):
     scenario = load_scenario('current_8deg')
     folder = make_run_folder(scenario, folder)
     flight = Outcome('aborted', 'plant_node was killed by SIGKILL', 0.0, 0, 0)
-    card = scorecard(scenario, 'nodes', flight, Scorer().result(Rules()))
+    card = scorecard(scenario, 'nodes', flight, Scorer(scenario).result(Rules()))
     write_score(folder, card)
     keep_traces(scenario, folder, card, make_tracer(scenario))
     return folder

@@ -18,6 +18,7 @@ from glider_guidance.path.settings import HelixPath, WaypointPath
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.rules import Rules
+from glider_mission.scenario import load_scenario
 
 quick = settings(max_examples=20)
 
@@ -69,7 +70,7 @@ def ticks(seconds):
 
 
 def score(log, settle_s=0.0, target_m=TARGET_M, **rules):
-    scorer = Scorer()
+    scorer = Scorer(load_scenario())
     scorer.add(log)
     return scorer.result(Rules(settle_s, target_m, **rules))
 
@@ -184,7 +185,7 @@ def test_steady_is_deeper_than_30_m(depth_m, steady):
 
 
 def test_without_a_tick_there_is_no_score():
-    result = Scorer().result(Rules())
+    result = Scorer(load_scenario()).result(Rules())
     assert result['ticks'] == 0
     assert result['final_state'] is None
     assert result['depth_m'] == {'max': None, 'overshoot': None}
@@ -438,7 +439,7 @@ def test_scores_agree_with_an_independent_implementation(seed):
 def test_score_does_not_depend_on_the_blocks(cuts):
     t = ticks(1000.0)
     log = make_log(t, e2=np.sin(t), psi=0.1 * np.sin(t / 7.0))
-    scorer = Scorer()
+    scorer = Scorer(load_scenario())
     for block in np.split(log, sorted(cuts)):
         scorer.add(block)
     assert scorer.ticks == len(t)
@@ -448,7 +449,7 @@ def test_score_does_not_depend_on_the_blocks(cuts):
 def test_scorer_keeps_nothing_of_a_block_by_reference():
     """The direct engine uses its block again."""
     log = make_log(ticks(800.0), e2=1.0)
-    scorer = Scorer()
+    scorer = Scorer(load_scenario())
     scorer.add(log)
     before = scorer.result(Rules())
     log[:] = 9.0

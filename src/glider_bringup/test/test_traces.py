@@ -196,7 +196,7 @@ def test_noise_is_taken_off_and_what_was_measured_is_kept_beside():
     """The error drawn is the error scored, and both miss what a metre of noise adds."""
     fields = {'dives': 0, 'duration_s': 1500.0, 'settle_s': 0.0, 'profile.depth_m': 60.0}
     scenario = load_scenario('noisy_sensors', fields)
-    tracer, scorer = make_tracer(scenario), Scorer()
+    tracer, scorer = make_tracer(scenario), Scorer(scenario)
     for block in fly_blocks(*mission_of(scenario)):
         tracer.add(block)
         scorer.add(block)

@@ -506,7 +506,7 @@ def noisy_flight():
 
 def test_score_with_noise_is_that_of_the_true_motion(noisy_flight):
     scenario, log, truth = noisy_flight
-    scorer = Scorer()
+    scorer = Scorer(scenario)
     for block in (log[:7000], log[7000:7001], log[7001:]):
         scorer.add(block)
     result = scorer.result(Rules(60.0, 60.0))
@@ -533,7 +533,7 @@ def test_what_is_recorded_is_what_was_measured(noisy_flight):
     east = COLUMNS['odom'].start
     noise = log[:, [east + 1, east]] - truth[:, :2]
     assert np.std(noise) == pytest.approx(1.0, rel=0.02)
-    apparent = Scorer()
+    apparent = Scorer(scenario)
     apparent.add(of_the_sea(log))
     assert apparent.result(Rules(60.0, 60.0))['depth_m']['max'] > np.max(truth[:, 2]) + 0.5
 

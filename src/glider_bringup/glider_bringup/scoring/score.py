@@ -18,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from glider_base.frames import (
-    OriginSettings,
     euler_from_quaternion,
     heading_of,
     odometry_from_wire,
@@ -114,39 +113,29 @@ def _take_off_noise(log, first_tick, readings):
 
 
 class Scorer:
-    """Collects log blocks, then gives the score.
+    """Collects log blocks, then gives the score."""
 
-    Without a scenario there are no faults, no bottom, no noise of where actuators say that they
-    are, the vehicle knows its place, and it has no steering surface, battery, crush depth and drop
-    weight.
-    """
-
-    def __init__(self, scenario: Scenario | None = None) -> None:
-        vehicle, faults, bottom, origin = None, (), NO_BOTTOM, OriginSettings()
-        self._waiting = list(scenario.orders) if scenario else []
+    def __init__(self, scenario: Scenario) -> None:
+        vehicle, bottom = load_vehicle(scenario.vehicle), scenario.bottom()
+        self._waiting = list(scenario.orders)
         self._followed: list[Order] = []  #: orders that held
         self._path_since = 0  #: tick from which the last path is followed
-        self.topics = ()  #: that it needs, beside those that are always read
-        self._course_rad = 0.0  #: of the path at its start, if the target never moves along it
-        self._readings = None
-        if scenario:
-            vehicle, faults = load_vehicle(scenario.vehicle), scenario.faults
-            bottom, origin = scenario.bottom(), scenario.origin
-            self._course_rad = scenario.path.course_rad()
-            readings = make_readings(vehicle.params(), scenario.seed)
-            self._readings = readings if readings.is_noisy else None
-            if scenario.navigation.jumps:
-                self.topics = ('fix', 'believed_current', 'current_velocity')
-        self._steers_by = vehicle.steers_by if vehicle else ''
-        self._hull = (math.inf, math.inf)  #: depth that it is rated for and that it bears (m)
-        if vehicle:
-            self._hull = vehicle.rated_depth_m, vehicle.crush_depth_m
-        self._has_weight = bool(vehicle and vehicle.drop_weight)
+        reckons = scenario.navigation.jumps
+        #: that it needs, beside those that are always read
+        self.topics = ('fix', 'believed_current', 'current_velocity') if reckons else ()
+        #: of the path at its start, if the target never moves along it
+        self._course_rad = scenario.path.course_rad()
+        readings = make_readings(vehicle.params(), scenario.seed)
+        self._readings = readings if readings.is_noisy else None
+        self._steers_by = vehicle.steers_by
+        #: depth that it is rated for and that it bears (m)
+        self._hull = vehicle.rated_depth_m, vehicle.crush_depth_m
+        self._has_weight = bool(vehicle.drop_weight)
         self._bottom = None if bottom is NO_BOTTOM else BottomWatch(bottom)
         self._truth = TrueMotion()
-        self._navigation = NavigationScorer(origin.params(), reckons=bool(self.topics))
-        self._faults = FaultTimes(faults)
-        self._energy = EnergyScorer(vehicle.energy if vehicle else None)
+        self._navigation = NavigationScorer(scenario.origin.params(), reckons)
+        self._faults = FaultTimes(scenario.faults)
+        self._energy = EnergyScorer(vehicle.energy)
         self._blocks: list[np.ndarray] = []
         self._first: np.ndarray | None = None
         self._last: np.ndarray | None = None

@@ -128,7 +128,7 @@ def _figures(card: dict[str, Any], before: str = '') -> Iterator[tuple[str, Any]
 
 def result_names(scenario: Scenario) -> set[str]:
     """Names in a result, apart from its dimensions; a scorecard without a flight has them too."""
-    empty = Scorer().result(Rules())
+    empty = Scorer(scenario).result(Rules())
     card = scorecard(scenario, 'direct', Outcome('completed', '', 0.0, 0, 0), empty)
     return NOT_FIGURES | {variable_name(figure) for figure, _ in _figures(card)}
 
