@@ -18,6 +18,7 @@ import numpy as np
 from glider_base.errors import ConfigurationError
 from glider_base.frames import imu_to_wire, quaternion_from_euler, to_geodetic
 from glider_base.kernel import kernel
+from glider_base.kernels.packing import put
 from glider_base.signals import TICK_NS, TICK_S, Imu
 from glider_base.wiring import WHEN_SILENT
 from glider_flights.folders import Progress
@@ -175,13 +176,12 @@ def _settings(
     flight: Flight, segment: Segment, method: str, current: str, launched_m: np.ndarray
 ) -> NavigationSettings:
     """Navigation of a vehicle with the lift and drag of a segment."""
+    latitude, longitude = flight.origin_deg.tolist()
     settings = {
         'method': method,
         'current': current,
         'vehicle': _vehicle(segment),
-        'origin': dict(
-            zip(('latitude_deg', 'longitude_deg'), map(float, flight.origin_deg), strict=True)
-        ),
+        'origin': {'latitude_deg': latitude, 'longitude_deg': longitude},
         'north_m': float(launched_m[0]),
         'east_m': float(launched_m[1]),
         'imu_period_s': 30.0,
@@ -252,9 +252,7 @@ def _imu_rows(pitch_rad, heading_rad):
     rows = np.empty((len(pitch_rad), 8))
     for i in range(len(pitch_rad)):
         q_w, q_x, q_y, q_z = quaternion_from_euler(0.0, pitch_rad[i], heading_rad[i])
-        wire = imu_to_wire(Imu(q_w, q_x, q_y, q_z, 0.0, 0.0, 0.0, False))
-        for j in range(8):
-            rows[i, j] = wire[j]
+        put(rows, i, 0, (imu_to_wire(Imu(q_w, q_x, q_y, q_z, 0.0, 0.0, 0.0, False)),))
     return rows
 
 

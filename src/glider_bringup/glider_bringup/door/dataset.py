@@ -24,6 +24,7 @@ from glider_base.frames import (
     wrench_from_wire,
 )
 from glider_base.kernel import kernel, source_digest
+from glider_base.kernels.packing import put
 from glider_base.signals import TICK_NS, Adaptation
 from glider_base.wiring import NO_ECHO
 from glider_bringup.scoring.outcome import as_told
@@ -204,33 +205,27 @@ _BESIDE = {
 
 
 @kernel
-def _put(out, row, start, values):
-    for i, value in enumerate(values):
-        out[start + i, row] = value
-
-
-@kernel
 def _turn(log, out):
-    """Fill ``out``, float64[len(_TURNED), n], from log rows, float64[n, ROW]."""
+    """Fill ``out``, float64[n, len(_TURNED)], from log rows, float64[n, ROW]."""
     for row in range(log.shape[0]):
-        odometry = odometry_from_wire(log[row, _ODOM : _ODOM + 13])
-        _put(out, row, 0, odometry)
-        angles = euler_from_quaternion(odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z)
-        _put(out, row, 13, angles)
-        _put(out, row, 16, reference_from_wire(log[row, _REFERENCE : _REFERENCE + 13]))
-        _put(out, row, 28, water_from_wire(log[row, _CURRENT : _CURRENT + 3]))
-        _put(out, row, 31, water_from_wire(log[row, _ESTIMATE : _ESTIMATE + 3]))
+        believed = odometry_from_wire(log[row, _ODOM : _ODOM + 13])
+        angles = euler_from_quaternion(believed.q_w, believed.q_x, believed.q_y, believed.q_z)
+        reference = reference_from_wire(log[row, _REFERENCE : _REFERENCE + 13])
+        water = water_from_wire(log[row, _CURRENT : _CURRENT + 3])
+        estimate = water_from_wire(log[row, _ESTIMATE : _ESTIMATE + 3])
         true = odometry_from_wire(log[row, _TRUTH : _TRUTH + 13])
-        _put(out, row, 34, (true.p_n, true.p_e, true.p_d))
-        _put(out, row, 37, euler_from_quaternion(true.q_w, true.q_x, true.q_y, true.q_z))
-        _put(out, row, 40, wrench_from_wire(log[row, _WRENCH : _WRENCH + 3]))
+        motion = (true.p_n, true.p_e, true.p_d)
+        attitude = euler_from_quaternion(true.q_w, true.q_x, true.q_y, true.q_z)
+        wrench = wrench_from_wire(log[row, _WRENCH : _WRENCH + 3])
+        told = (believed, angles, reference, water, estimate, motion, attitude, wrench)
+        put(out, row, 0, told)
 
 
 def _numbers(log: np.ndarray, steers_by: str) -> dict[str, tuple]:
     """Variables that are numbers, as xarray takes them."""
-    out = np.empty((len(_TURNED), len(log)))
+    out = np.empty((len(log), len(_TURNED)))
     _turn(log, out)
-    found = dict(zip(_TURNED, out, strict=True))
+    found = dict(zip(_TURNED, out.T.copy(), strict=True))
     for topic, variables in groupby(_same(steers_by), attrgetter('topic')):
         found |= zip(variables, log[:, COLUMNS[topic]].T.copy(), strict=False)
     return _named(found)
