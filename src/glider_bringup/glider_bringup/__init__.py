@@ -10,18 +10,18 @@ from importlib import import_module
 from importlib.metadata import EntryPoints, entry_points
 from typing import Any
 
-#: Public names: the module of each, and its name there.
+#: Public names, and the module of each.
 _PUBLIC = {
-    'ConfigurationError': ('glider_base.settings', 'ConfigurationError'),
-    'Flight': ('glider_bringup.door.flight', 'Flight'),
-    'Run': ('glider_bringup.door.run', 'Run'),
-    'Scenario': ('glider_mission.scenario', 'Scenario'),
-    'fly': ('glider_bringup.door.run', 'fly'),
-    'load_scenario': ('glider_mission.scenario', 'load_scenario'),
-    'open_run': ('glider_bringup.door.run', 'open_run'),
-    'scenarios': ('glider_bringup.door.shipped', 'scenarios'),
-    'trim': ('glider_bringup.door.shipped', 'trim'),
-    'vehicles': ('glider_bringup.door.shipped', 'vehicles'),
+    'ConfigurationError': 'glider_base.settings',
+    'Flight': 'glider_bringup.door.flight',
+    'Run': 'glider_bringup.door.run',
+    'Scenario': 'glider_mission.scenario',
+    'fly': 'glider_bringup.door.run',
+    'load_scenario': 'glider_mission.scenario',
+    'open_run': 'glider_bringup.door.run',
+    'scenarios': 'glider_bringup.door.shipped',
+    'trim': 'glider_bringup.door.shipped',
+    'vehicles': 'glider_bringup.door.shipped',
 }
 __all__ = list(_PUBLIC)
 
@@ -33,8 +33,7 @@ def _added() -> EntryPoints:
 
 def __getattr__(name: str) -> Any:
     if name in _PUBLIC:
-        module, public = _PUBLIC[name]
-        found = getattr(import_module(module), public)
+        found = getattr(import_module(_PUBLIC[name]), name)
     elif not name.startswith('_') and name in _added().names:
         found = _added()[name].load()
     else:

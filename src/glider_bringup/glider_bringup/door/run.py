@@ -240,17 +240,10 @@ def fly(
 @contextmanager
 def _run_folder(scenario: Scenario, out: str | Path | None, engine: str) -> Iterator[Path | None]:
     """Folder of a run: a new one, one that nodes need for as long as they fly, or none."""
-    if out is not None:
-        with run_folder(scenario, Path(out)) as folder:
-            yield folder
-    elif engine == 'nodes':
-        with (
-            TemporaryDirectory() as scratch,
-            run_folder(scenario, Path(scratch) / 'run') as folder,
-        ):
-            yield folder
-    else:
-        yield None
+    with ExitStack() as stack:
+        if out is None and engine == 'nodes':
+            out = Path(stack.enter_context(TemporaryDirectory())) / 'run'
+        yield stack.enter_context(run_folder(scenario, Path(out))) if out is not None else None
 
 
 def fly_by(
