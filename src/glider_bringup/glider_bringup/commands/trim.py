@@ -23,24 +23,15 @@ app = typer.Typer()
 @app.command(epilog='Example: ./glider trim zhang2021 --net-heaviness-kg 0.4 --pitch-deg -30')
 def trim(
     vehicle: Annotated[str, typer.Argument(help='Vehicle by name or path of its YAML file.')],
-    net_heaviness_kg: Annotated[
-        float, typer.Option('--net-heaviness-kg', help='Net buoyancy, + sinks (kg).')
-    ],
-    pitch_deg: Annotated[
-        float | None, typer.Option('--pitch-deg', help='Pitch, + nose up (deg).')
-    ] = None,
+    net_heaviness_kg: Annotated[float, typer.Option(help='Net buoyancy, + sinks (kg).')],
+    pitch_deg: Annotated[float | None, typer.Option(help='Pitch, + nose up (deg).')] = None,
     pitch_mass_m: Annotated[
-        float | None,
-        typer.Option('--pitch-mass-m', help='Pitch mass from its neutral position (m).'),
+        float | None, typer.Option(help='Pitch mass from its neutral position (m).')
     ] = None,
-    roll_mass_deg: Annotated[
-        float, typer.Option('--roll-mass-deg', help='Roll mass, + to starboard (deg).')
-    ] = 0.0,
+    roll_mass_deg: Annotated[float, typer.Option(help='Roll mass, + to starboard (deg).')] = 0.0,
     fin_deg: Annotated[
         float,
-        typer.Option(
-            '--fin-deg', help='Tail fin, or other steering surface, + to starboard (deg).'
-        ),
+        typer.Option(help='Tail fin, or other steering surface, + to starboard (deg).'),
     ] = 0.0,
     changes: Annotated[
         list[str] | None,
