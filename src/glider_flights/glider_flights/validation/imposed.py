@@ -16,6 +16,7 @@ from glider_base.frames import (
     wrap_angle,
 )
 from glider_base.kernel import kernel, replace
+from glider_base.kernels.packing import put
 from glider_base.signals import Joints, Water
 from glider_model.ocean.density import displacing, immersed
 from glider_model.plant.motion import Motion, acceleration, integrate
@@ -187,8 +188,7 @@ def fly_held(table, vehicle, step, flown):
         here = table[k]
         phi, theta = here[2], here[3]
         speed = math.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
-        flown[k, 0], flown[k, 1], flown[k, 2], flown[k, 3] = down, ahead, abeam, heading
-        flown[k, 4], flown[k, 5], flown[k, 6] = speed, phi, theta
+        put(flown, k, 0, ((down, ahead, abeam, heading, speed, phi, theta),))
         if k == len(table) - 1:
             break
         after = table[k + 1]
@@ -225,8 +225,7 @@ def fly_free(table, vehicle, step, flown):
         phi, theta, _ = euler_from_quaternion(x.q_w, x.q_x, x.q_y, x.q_z)
         before = _rate(x.u, x.v, x.w, phi, theta)
         speed = math.sqrt(x.u * x.u + x.v * x.v + x.w * x.w)
-        flown[k, 0], flown[k, 1], flown[k, 2], flown[k, 3] = down, ahead, abeam, heading
-        flown[k, 4], flown[k, 5], flown[k, 6] = speed, phi, theta
+        put(flown, k, 0, ((down, ahead, abeam, heading, speed, phi, theta),))
         if k == len(table) - 1:
             break
         after = table[k + 1]

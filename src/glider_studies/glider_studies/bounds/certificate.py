@@ -249,13 +249,6 @@ def region(loop: SteeringLoop, slope, tried=TRIED) -> Region | None:
     return best
 
 
-def _least(loop: SteeringLoop, slope: float, times: float) -> dict[str, float]:
-    """Least gains in a region."""
-    within = {name: 1.0 / times for name in limits(loop)}
-    sine = math.sin(_LARGEST_HEADING) / _LARGEST_HEADING
-    return {'line_of_sight': slope, 'sine': sine, **within}
-
-
 def _at_rest(loop: SteeringLoop) -> np.ndarray:
     """State (n, 2) of a start (e, psi): its heading is what was asked for until now."""
     states = names(loop)
@@ -290,7 +283,9 @@ def _largest(y: np.ndarray, basis: np.ndarray, rows: np.ndarray) -> float:
 
 
 def _region(loop, reach, slope, times) -> Region | None:
-    ticks = [tick(loop, one) for one in box(loop, _least(loop, slope, times))]
+    sine = math.sin(_LARGEST_HEADING) / _LARGEST_HEADING
+    least = {'line_of_sight': slope, 'sine': sine, **dict.fromkeys(limits(loop), 1.0 / times)}
+    ticks = [tick(loop, one) for one in box(loop, least)]
     scale, rows = _scales(loop), _bounds(loop, ticks, reach, times)
     scaled = [_scaled(one, scale) for one in ticks]
     basis = _symmetric(len(scale))

@@ -234,7 +234,10 @@ class Plan:
             for field, value in self.sweep.set.items()
             if not any(overlap(field, other) for other in self.given)
         } | self.given
-        self.axes = [_axis(name, one) for name, one in self.sweep.dimensions.items()]
+        self.axes = [
+            Axis(name, getattr(one, 'field', ''), *map(list, zip(*one.steps(), strict=True)))
+            for name, one in self.sweep.dimensions.items()
+        ]
         self.shape = tuple(len(axis.values) for axis in self.axes)
         self.cells = math.prod(self.shape)
         if self.cells > MAX_CELLS:
@@ -356,11 +359,6 @@ def _digest(scenario: Scenario) -> str:
 def vehicle_digest(vehicle: str) -> str:
     """Digest of the file of a vehicle given by name or path, without what is changed in it."""
     return hashlib.sha256(read_text(vehicle_path(vehicle)).encode()).hexdigest()
-
-
-def _axis(name: str, dimension: Dimension) -> Axis:
-    values, changes = zip(*dimension.steps(), strict=True)
-    return Axis(name, getattr(dimension, 'field', ''), list(values), list(changes))
 
 
 # ---------------------------------------------------------------------------------- files
