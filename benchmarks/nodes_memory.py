@@ -1,12 +1,7 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Resident memory of each process in a long flight over topics, and whether it stays.
+"""Resident memory of each process in a long flight over topics, and whether it stays."""
 
-``python benchmarks/nodes_memory.py 5`` measures five simulated hours instead of one.
-"""
-
-import json
-import sys
 from collections.abc import Callable
 
 from nodes import fly_over_topics
@@ -25,7 +20,7 @@ MEANING = {
 }
 
 
-def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
+def measure(progress: Callable[[str], None]) -> dict:
     """Figures of one flight."""
     samples = {name: [] for name in PROCESSES}
 
@@ -33,19 +28,15 @@ def measure(progress: Callable[[str], None], hours: float = HOURS) -> dict:
         for name, megabytes in memory_mb('VmRSS').items():
             samples[name].append((tick * TICK_S / 3600.0, megabytes))
 
-    progress(f'{hours:g} h over topics')
-    fly_over_topics(hours * 3600.0, sample)
+    progress(f'{HOURS:g} h over topics')
+    fly_over_topics(HOURS * 3600.0, sample)
     growth = {name: growth_mb_per_h(taken) for name, taken in samples.items()}
     last = {name: taken[-1][1] for name, taken in samples.items()}
     return {
-        'nodes_memory_h': hours,
+        'nodes_memory_h': HOURS,
         **{f'{name}_rss_mb': megabytes for name, megabytes in last.items()},
         'nodes_rss_growth_mb_per_h': max(growth.values()),
         'nodes_30h_rss_mb': max(
-            last[name] + max(0.0, growth[name]) * (MISSION_HOURS - hours) for name in PROCESSES
+            last[name] + max(0.0, growth[name]) * (MISSION_HOURS - HOURS) for name in PROCESSES
         ),
     }
-
-
-if __name__ == '__main__':
-    print(json.dumps(measure(lambda text: None, float(sys.argv[1])), indent=2))
