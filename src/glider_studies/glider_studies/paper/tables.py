@@ -44,14 +44,13 @@ def _by_flight(rows: list[dict], said: dict[str, Any]) -> Table:
     figures = said.get('figures') or compared(rows)
     texts = said.get('texts')
     if texts is None:
-        shown = {
-            'case': any(row['case'] for row in rows),
-            'flown by': True,
-            'LOS': len({row['guidance'] for row in rows}) > 1,
-            'status': any(row['status'] != 'completed' for row in rows),
-        }
-        fields = dict(zip(('case', 'controller', 'guidance', 'status'), shown, strict=True))
-        texts = {field: name for field, name in fields.items() if shown[name]}
+        columns = (
+            ('case', 'case', any(row['case'] for row in rows)),
+            ('controller', 'flown by', True),
+            ('guidance', 'LOS', len({row['guidance'] for row in rows}) > 1),
+            ('status', 'status', any(row['status'] != 'completed' for row in rows)),
+        )
+        texts = {field: name for field, name, is_shown in columns if is_shown}
     table = _table(list(texts.values()), list(figures.values()))
     adaptive = by_case(rows, 'adaptive')
     for row in rows:
