@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from mcap_ros2.reader import read_ros2_messages
 
+import glider_bringup as glider
 from glider_bringup.engines.flight import fly as fly_flight
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
@@ -108,6 +109,18 @@ def test_a_run_goes_on_past_the_end_of_its_path_only_if_told_to(at_end):
     card = fly(None, 'current_8deg', dives=0, duration_s=3000.0, **fields)
     assert (card['sim_time_s'] < 2000.0) is (at_end == 'stop')
     assert (card['end_of_path_m'] is None) is (at_end == 'continue')
+
+
+def test_the_last_of_its_dives_may_end_its_path_and_another_path_gives_it_no_more():
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 300.0, 'at_end': 'stop'}
+    changes = {'dives': 1, 'profile.depth_m': 200.0, 'profile.prepare_s': 0.0, 'path': path}
+    arrived = glider.fly('current_8deg', {**changes, 'duration_s': 2000.0}).score
+    assert arrived['dives'] == 1 and arrived['arrival']['arrived']
+    at_s = arrived['arrival']['t_s'] + 10.0
+    changes['orders'] = [{'at_s': at_s, 'path': {**path, 'length_m': 2000.0}}]
+    ordered = glider.fly('current_8deg', {**changes, 'duration_s': 2000.0}).score
+    assert ordered['dives'] == 1 and not ordered['arrival']['arrived']
+    assert ordered['sim_time_s'] == arrived['sim_time_s']
 
 
 def test_a_path_in_three_dimensions_ends_at_the_surface_too():

@@ -217,10 +217,15 @@ def _start(state, odometry, s, params):
 
 @kernel
 def _change_path(state, s, params):
-    """State at the first tick of another path, at its ``s`` (m); who was at the end dives on."""
+    """State at the first tick of another path, at its ``s`` (m).
+
+    Who was at the end dives on, if dives are left.
+    """
     profile = state.profile
     if profile.stage == AT_END_OF_PATH:
-        profile = replace(profile, stage=SURFACE_PREPARATION, ticks=0)
+        done = 0 < params.profile.dives <= profile.dives
+        stage = WAITING_ON_SURFACE if done else SURFACE_PREPARATION
+        profile = replace(profile, stage=stage, ticks=0)
     if is_descending(profile.stage):
         profile = replace(profile, turn_depth=params.profile.depth)
     progress = on_another_path(state.progress, state.tick, s, params.no_progress_surfacings)

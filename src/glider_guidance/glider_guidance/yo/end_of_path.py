@@ -82,7 +82,7 @@ def next_dive(left, depth, surfaced, lead_s, dives, params):
     if dive_s <= 0.0:
         return params.depth
     count = max(1.0, math.ceil(left_s / dive_s))
-    if count > SHARED_DIVES or (params.dives > 0 and count > params.dives - dives):
+    if count > SHARED_DIVES or (params.dives > 0 and count > max(1, params.dives - dives)):
         return params.depth
     made_good_s = left_s / count
     planned = top + 0.5 * rate * (made_good_s - turns_s)
