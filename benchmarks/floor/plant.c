@@ -514,6 +514,8 @@ static inline Motion integrate(
 
 static Dives dives_after(Dives dives, double depth, double dive)
 {
+    if (dives.turn == INFINITY) /* it may begin in a dive */
+        return (Dives){dives.count, depth > dive, depth};
     double turn = dives.is_down ? max(dives.turn, depth) : min(dives.turn, depth);
     if (fabs(depth - turn) <= dive)
         return (Dives){dives.count, dives.is_down, turn};

@@ -4,6 +4,8 @@
 
 from typing import NamedTuple
 
+from glider_base.kernel import kernel
+
 #: A virtual target as high above the water as this (m, + down) asks control for the surface with
 #: all there is: the whole pump, the mass at its climb stop, no roll. No path leads there.
 SURFACE_TARGET = -1000.0
@@ -11,6 +13,10 @@ SURFACE_TARGET = -1000.0
 #: Length of one tick (s) and of one tick in the integer nanoseconds of a message stamp.
 TICK_S = 0.1
 TICK_NS = 100_000_000
+
+#: A dive leads so far down and up again (m), wherever it turns; in shallow profiles this share of
+#: their depth. One that begins deeper than this begins in a dive.
+DIVE_M, DIVE_SHARE = 20.0, 0.3
 
 #: Density of the sea water that coefficients and kilograms of net heaviness are for (kg/m^3).
 SEA_WATER_DENSITY = 1025.0
@@ -154,6 +160,12 @@ class Battery(NamedTuple):
 
 #: Stands in the reason of every run whose numbers ceased to be finite.
 NOT_FINITE = 'not finite at tick'
+
+
+@kernel
+def dive_m(depth_m):
+    """How far (m) a dive leads down and up again, in dives to a depth."""
+    return min(DIVE_M, DIVE_SHARE * depth_m)
 
 
 def not_finite(what: str, tick: int) -> str:

@@ -123,6 +123,19 @@ def test_the_last_of_its_dives_may_end_its_path_and_another_path_gives_it_no_mor
     assert ordered['sim_time_s'] == arrived['sim_time_s']
 
 
+@pytest.mark.parametrize(
+    ('begins_m', 'depth_m'), [(8.0, 20.0), (40.0, 50.0), (199.0, 200.0), (300.0, 200.0)]
+)
+def test_a_mission_that_begins_under_water_flies_its_dives(begins_m, depth_m):
+    """Two: it comes up after each."""
+    changes = {'initial.depth_m': begins_m, 'profile.depth_m': depth_m, 'dives': 2}
+    stays = {'profile.surface_every_dives': 1, 'profile.wait_s': 70.0}
+    run = glider.fly('current_8deg', {**changes, **stays, 'duration_s': 6000.0})
+    depth = run.to_xarray().odom_depth.values
+    assert np.count_nonzero(np.diff((depth < 3.0).astype(int)) == 1) == 2
+    assert (run.score['status'], run.score['dives']) == ('completed', 2)
+
+
 def test_a_path_in_three_dimensions_ends_at_the_surface_too():
     """The path ends 20 m deep: it comes up from there, along its last course."""
     path = {'kind': 'waypoints', 'waypoints': [[0, 0, 10], [400, 0, 200], [900, 200, 20]]}

@@ -11,7 +11,15 @@ from typing import NamedTuple
 
 from glider_base.frames import heading_of, pitch_of, rotate_to_ned
 from glider_base.kernel import kernel, replace
-from glider_base.signals import SURFACE_TARGET, TICK_S, Odometry, Reference, TrackingError, Water
+from glider_base.signals import (
+    SURFACE_TARGET,
+    TICK_S,
+    Odometry,
+    Reference,
+    TrackingError,
+    Water,
+    dive_m,
+)
 from glider_guidance.current_observer import ObserverParams, ObserverState, observer_step
 from glider_guidance.los import target_rate
 from glider_guidance.method import Leg, Situation, method_step
@@ -190,10 +198,14 @@ def hear_fixes(state, odometry, known, dt):
 
 @kernel
 def _start(state, odometry, s, params):
-    """State at the first tick, at ``s`` (m) of the path: filters at the measured attitude."""
+    """State at the first tick, at ``s`` (m) of the path: filters at the measured attitude.
+
+    One that begins under water glides at once: only at the surface is there a dive to prepare.
+    """
     q_w, q_x, q_y, q_z = odometry.q_w, odometry.q_x, odometry.q_y, odometry.q_z
     theta, psi = pitch_of(q_w, q_x, q_y, q_z), heading_of(q_w, q_x, q_y, q_z)
-    stage = GLIDING_DOWN if params.profile.follows_path else SURFACE_PREPARATION
+    is_under = odometry.p_d > dive_m(params.profile.depth)
+    stage = GLIDING_DOWN if is_under or params.profile.follows_path else SURFACE_PREPARATION
     profile = replace(
         state.profile,
         stage=stage,

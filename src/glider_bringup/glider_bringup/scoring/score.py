@@ -25,7 +25,7 @@ from glider_base.frames import (
     poses_from_wire,
 )
 from glider_base.kernel import kernel
-from glider_base.signals import TICK_S, Odometry
+from glider_base.signals import TICK_S, Odometry, dive_m
 from glider_bringup.scoring.energy import EnergyScorer
 from glider_bringup.scoring.faults import FaultTimes
 from glider_bringup.scoring.navigation import NavigationScorer
@@ -50,7 +50,7 @@ from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario
 from glider_model.ocean.bottom import NO_BOTTOM
-from glider_model.plant.plant import DIVED_M, NO_DIVES, dive_m, dives_after
+from glider_model.plant.plant import DIVED_M, NO_DIVES, dives_after
 from glider_model.plant.readings import make_readings, noise_of_readings
 from glider_model.vehicle.file import load_vehicle
 

@@ -11,7 +11,7 @@ from glider_base.errors import ConfigurationError
 from glider_base.frames import OriginSettings, quaternion_from_euler, rotate_to_body
 from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number
-from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, not_finite
+from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, dive_m, not_finite
 from glider_base.slot import default, slot
 from glider_base.wiring import SENSORS
 from glider_model.ocean.bottom import NO_BOTTOM, BathymetrySettings, aground, bottom_depth
@@ -42,9 +42,6 @@ from glider_model.vehicle.perturb import PerturbSettings, perturbed
 LARGEST_ERROR_J = 1e-6
 #: Steps in a tick at most.
 MOST_STEPS = 256
-#: A dive leads so far down and up again (m), wherever it turns; in shallow profiles this share of
-#: their depth.
-DIVE_M, DIVE_SHARE = 20.0, 0.3
 #: Time at the surface after the last dive (s).
 SURFACE_S = 60.0
 #: Shallower than this the vehicle is at the surface (m).
@@ -115,14 +112,11 @@ class PlantParams(NamedTuple):
     bottom: NamedTuple = NO_BOTTOM  #: flat, or by a chart
 
 
-def dive_m(depth_m: float) -> float:
-    """How far (m) a dive leads down and up again, in dives to a depth."""
-    return min(DIVE_M, DIVE_SHARE * depth_m)
-
-
 @kernel
 def dives_after(dives: Dives, depth: float, dive: float) -> Dives:
     """What there is of the dives a tick later, at a depth (m); ``dive`` is `dive_m`."""
+    if dives.turn == math.inf:  # it may begin in a dive
+        return Dives(dives.count, depth > dive, depth)
     turn = max(dives.turn, depth) if dives.is_down else min(dives.turn, depth)
     if abs(depth - turn) <= dive:
         return Dives(dives.count, dives.is_down, turn)
