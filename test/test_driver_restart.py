@@ -31,12 +31,7 @@ from glider_base.ros.wire import qos
 from glider_base.ros.wire.topics import topic_of
 from glider_base.wiring import JOINTS
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import (
-    AUTOPILOT,
-    RECORDER,
-    node_commands,
-    node_environment,
-)
+from glider_bringup.engines.processes import AUTOPILOT, RECORDER, node_commands, node_environment
 from glider_mission.scenario import load_scenario
 
 EXAMPLES = Path(__file__).resolve().parents[1] / 'examples'

@@ -41,12 +41,7 @@ from glider_base.wiring import NAVIGATION
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
-from glider_bringup.engines.processes import (
-    AUTOPILOT,
-    ON_BOARD,
-    node_commands,
-    node_environment,
-)
+from glider_bringup.engines.processes import AUTOPILOT, ON_BOARD, node_commands, node_environment
 from glider_mission.scenario import load_scenario
 
 STAND_IN = Path(__file__).resolve().parents[1] / 'examples' / 'stand_in.py'

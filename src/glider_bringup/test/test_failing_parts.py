@@ -22,21 +22,9 @@ from glider_bringup.engines.flight import mission_of
 from glider_control.control import control_step
 from glider_control.intake import REFUSED
 from glider_guard.guard import Heard, guard_step
-from glider_guard.rows import (
-    FROZEN,
-    LOST,
-    STUCK_BUOYANCY,
-    STUCK_ROLL,
-    SURFACES,
-    TOO_DEEP,
-)
+from glider_guard.rows import FROZEN, LOST, STUCK_BUOYANCY, STUCK_ROLL, SURFACES, TOO_DEEP
 from glider_guidance.guidance import guidance_abort, guidance_step
-from glider_guidance.yo.stage import (
-    GLIDING_DOWN,
-    GLIDING_UP,
-    INFLECTING_UP,
-    WAITING_ON_SURFACE,
-)
+from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP, INFLECTING_UP, WAITING_ON_SURFACE
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.scenario import load_scenario
 from glider_model.ocean.current import current_step

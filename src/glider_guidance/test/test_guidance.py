@@ -18,11 +18,7 @@ from glider_guidance.current_observer import ObserverState
 from glider_guidance.guidance import INFEASIBLE_S, WaterState, guidance_abort, guidance_step
 from glider_guidance.path.settings import HelixPath, StraightPath, WaypointPath
 from glider_guidance.settings import GuidanceSettings
-from glider_guidance.yo.stage import (
-    GLIDING_DOWN,
-    INFLECTING_UP,
-    SURFACING,
-)
+from glider_guidance.yo.stage import GLIDING_DOWN, INFLECTING_UP, SURFACING
 from glider_model.onboard.glide_polar import glide_horizontal_speed
 from glider_model.onboard.learnt_steering import SteeringLearningSettings, lookahead
 

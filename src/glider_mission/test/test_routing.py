@@ -17,13 +17,7 @@ from glider_mission.routing.forecast_chart import (
     observed,
     with_land,
 )
-from glider_mission.routing.fronts import (
-    Chart,
-    current_on,
-    fronts,
-    line_arrival,
-    made_good,
-)
+from glider_mission.routing.fronts import Chart, current_on, fronts, line_arrival, made_good
 from glider_mission.routing.pilot import LOOK_TICKS, Pilot
 from glider_mission.routing.plan import (
     pace_of,

@@ -12,14 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glider_base import files
-from glider_base.errors import (
-    MAX_LINE,
-    MAX_LINES,
-    MAX_SHOWN,
-    ConfigurationError,
-    printable,
-    shown,
-)
+from glider_base.errors import MAX_LINE, MAX_LINES, MAX_SHOWN, ConfigurationError, printable, shown
 from glider_base.files import (
     is_file,
     parse_json,

@@ -16,11 +16,7 @@ import pydantic
 from glider_base.kernel import kernel
 from glider_base.settings import number, positive
 from glider_base.signals import TICK_S, Vector
-from glider_model.ocean.current import (
-    CurrentParams,
-    CurrentState,
-    current_step_in_place,
-)
+from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.ocean.current_settings import SumOfCurrents
 
 #: No more of a forecast is believed than this share.

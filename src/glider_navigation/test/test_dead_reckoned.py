@@ -18,12 +18,7 @@ from glider_navigation.current_belief import Uncertainty, initial_belief
 from glider_navigation.forecast import Trust, weigh
 from glider_navigation.intake import is_refusing, take_in
 from glider_navigation.method import Fix, Heard, method_step
-from glider_navigation.methods.dead_reckoned import (
-    Way,
-    _dive,
-    _unforeseen,
-    place_covariance,
-)
+from glider_navigation.methods.dead_reckoned import Way, _dive, _unforeseen, place_covariance
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
 from glider_navigation.settings import NavigationSettings
 from glider_navigation.surface_stay import begin, drifted_variance, wait

@@ -43,12 +43,7 @@ from glider_studies.paper.experiments import (
     pid_better,
     report,
 )
-from glider_studies.paper.judges import (
-    judge_ablation,
-    judge_envelope,
-    judge_limits,
-    judge_survey,
-)
+from glider_studies.paper.judges import judge_ablation, judge_envelope, judge_limits, judge_survey
 from glider_studies.workers import worker_pool
 
 ROW_FIELDS = {'case', 'controller', 'guidance', 'status', 'finite', 'cross_track_m', 'command'}

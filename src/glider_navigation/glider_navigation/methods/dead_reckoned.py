@@ -25,20 +25,8 @@ from glider_navigation import flight_model, surface_stay
 from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
 from glider_navigation.current_belief import TIDE, CurrentBelief, Regressors
 from glider_navigation.flight_model import INITIAL_FLIGHT, INITIAL_ZERO, Flight, Zero
-from glider_navigation.forecast import (
-    Forecast,
-    Trust,
-    forecast_at,
-    make_forecast,
-    squared,
-    weigh,
-)
-from glider_navigation.method import (
-    Believed,
-    NavigationMethodSettings,
-    Start,
-    method_step,
-)
+from glider_navigation.forecast import Forecast, Trust, forecast_at, make_forecast, squared, weigh
+from glider_navigation.method import Believed, NavigationMethodSettings, Start, method_step
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
 from glider_navigation.surface_stay import Stay
 
