@@ -78,7 +78,7 @@ def test_tests_that_count_are_found_by_name(arguments, said):
 
 @pytest.mark.skipif(not OWN_WHEELS, reason='would set up an environment from wheels')
 def test_modules_are_read_once_where_no_bytecode_is_wanted_beside_them():
-    """As in most container images; each start took three times as long."""
+    """As in most container images: what a start imports is compiled once."""
     program = 'import sys, typer; print(sys.modules["typer"].__cached__)'
     kept = {'PYTHONDONTWRITEBYTECODE': '1', 'PYTHONPYCACHEPREFIX': ''}
     done = glider('', arguments=('python', '-c', program), **kept)

@@ -215,9 +215,17 @@ def at_times(
     return np.where((lasts_s > gap_s) & ~np.isin(time_s, told_s), math.nan, found)
 
 
-def angles_at_times(time_s: np.ndarray, own_s: np.ndarray, angles: np.ndarray, *gap) -> np.ndarray:
+def angles_at_times(
+    time_s: np.ndarray,
+    own_s: np.ndarray,
+    angles: np.ndarray,
+    gap_s: float = math.inf,
+    idle_s: np.ndarray = NEVER,
+) -> np.ndarray:
     """The same for angles (rad), across north."""
-    east, north = (at_times(time_s, own_s, part(angles), *gap) for part in (np.sin, np.cos))
+    east, north = (
+        at_times(time_s, own_s, part(angles), gap_s, idle_s) for part in (np.sin, np.cos)
+    )
     return np.arctan2(east, north)
 
 

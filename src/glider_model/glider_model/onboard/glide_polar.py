@@ -142,7 +142,7 @@ def steepen(theta, polar):
 
 @kernel
 def glide_attacks(theta, other, polar):
-    """`Attack` at two pitches (rad), side by side: a processor finds both in the time of one.
+    """`Attack` at two pitches (rad), side by side: neither search waits for the other.
 
     None where drag changes with the speed, or the angle is sought to the end.
     """
