@@ -256,4 +256,4 @@ def test_ctrl_c_within_compiled_code_ends_the_flight_as_aborted():
         [sys.executable, '-c', INTERRUPTED], capture_output=True, text=True, timeout=300
     )
     assert (done.returncode, done.stderr) == (0, '')
-    assert ast.literal_eval(done.stdout) == [('completed', 3), *9 * [('aborted', 1)]]
+    assert ast.literal_eval(done.stdout) == [('completed', 12), *9 * [('aborted', 1)]]

@@ -438,7 +438,8 @@ def test_scores_agree_with_an_independent_implementation(seed):
 @given(st.lists(st.integers(1, 3000), max_size=6))
 def test_score_does_not_depend_on_the_blocks(cuts):
     t = ticks(1000.0)
-    log = make_log(t, e2=np.sin(t), psi=0.1 * np.sin(t / 7.0))
+    depth = 80.0 * np.sin(t / 30.0) ** 2  # dives end and begin anywhere in a block
+    log = make_log(t, e2=np.sin(t), psi=0.1 * np.sin(t / 7.0), depth=depth)
     scorer = Scorer(load_scenario())
     for block in np.split(log, sorted(cuts)):
         scorer.add(block)

@@ -208,22 +208,24 @@ def fault_of(row: np.ndarray, tick: int) -> str:
     return fault or next(not_finite(f'{publisher(name).name}: {name}', tick) for name in wrong)
 
 
-def blocks_of(advance: Callable[[np.ndarray], tuple[int, bool]]) -> Iterator[np.ndarray]:
+def blocks_of(
+    advance: Callable[[np.ndarray], tuple[int, bool]], ticks: int = BLOCK_TICKS
+) -> Iterator[np.ndarray]:
     """Fly block by block; ``advance`` fills rows of a log, and says how many, and if it is over.
 
-    Yields float64[n, ROW], n <= BLOCK_TICKS, which is used again for the next block. Raises
+    Yields float64[n, ROW], n <= ``ticks``, which is used again for the next block. Raises
     FlightError after the last tick of which every number is finite.
     """
-    log = np.empty((BLOCK_TICKS, ROW))
-    finished, ticks = False, 0
+    log = np.empty((ticks, ROW))
+    finished, flown = False, 0
     while not finished:
         rows, finished = advance(log)
         good = finite_rows(log[:rows])
         if good:
             yield log[:good]
         if good < rows:
-            raise FlightError(fault_of(log[good], ticks + good))
-        ticks += rows
+            raise FlightError(fault_of(log[good], flown + good))
+        flown += rows
 
 
 def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarray]:

@@ -45,6 +45,9 @@ from glider_mission.scenario import Scenario
 _STAGE, _NO_PROGRESS = COLUMNS['stage'], COLUMNS['no_progress']
 _ODOM, _BATTERY = COLUMNS['odom'], COLUMNS['battery']
 
+#: Rows that takers are given at a time: a quarter of an hour, which a processor's cache may hold.
+TAKEN_TICKS = 9000
+
 #: Called now and then with the ticks flown and the depth (m).
 Progress = Callable[[int, float], None]
 
@@ -318,7 +321,8 @@ def fly(
         start = time.perf_counter()
         try:
             held = Held(scenario, (state, params), takers)
-            for log in blocks_of(_piloted(held, pilot, takers) if pilot else held.fly):
+            advance = _piloted(held, pilot, takers) if pilot else held.fly
+            for log in blocks_of(advance, TAKEN_TICKS):
                 for taker in takers:
                     taker.add(log)
                 ticks += len(log)

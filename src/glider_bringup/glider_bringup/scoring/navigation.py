@@ -2,12 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well the vehicle knew where it was: at each surfacing, before the first fix told it."""
 
-import itertools
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from glider_base.frames import Origin, from_geodetic
+from glider_base.kernel import kernel
 from glider_bringup.scoring.scores import largest, rms, seconds
 from glider_mission.blocks import COLUMNS
 from glider_model.onboard.fix_watch import DIVES_M, SURFACES_M
@@ -23,6 +24,33 @@ FOURTH = 3
 ELLIPSE_95 = 5.991
 
 
+class _Way(NamedTuple):
+    """Of a way under water: sums of the current and of squared cross-track errors, and ticks."""
+
+    east: float = 0.0
+    north: float = 0.0
+    squares: float = 0.0
+    ticks: int = 0
+
+
+@kernel
+def _until_turn(log, true, start, is_deep, way):
+    """Row from ``start`` on that dives or surfaces, or the number of rows; the way until then."""
+    for row in range(start, len(log)):
+        depth = -true[row, _ODOM + 2]
+        if depth < SURFACES_M if is_deep else depth > DIVES_M:
+            return row, way
+        if is_deep:
+            error, current = true[row, _E2], log[row, _CURRENT:]
+            way = _Way(
+                way.east + current[0],
+                way.north + current[1],
+                way.squares + error * error,
+                way.ticks + 1,
+            )
+    return len(log), way
+
+
 class NavigationScorer:
     """Takes in log rows, and tells of every surfacing.
 
@@ -33,8 +61,7 @@ class NavigationScorer:
     def __init__(self, origin: Origin, reckons: bool = False) -> None:
         self._origin, self._reckons = origin, reckons
         self._ticks, self._is_deep = 0, False
-        #: of the way under water: sum of the current, of squared cross-track errors, and ticks
-        self._current, self._squares, self._deep_ticks = np.zeros(2), 0.0, 0
+        self._way = _Way()
         self._dive_tick, self._waits_for_fix, self._was_fixed = 0, False, False
         self._mean_current = np.zeros(2)  #: of the last whole way, east and north (m/s)
         self._ways: list[float] = []  #: rms of the true cross-track error of each (m)
@@ -44,21 +71,14 @@ class NavigationScorer:
 
     def add(self, log: np.ndarray, true: np.ndarray) -> None:
         """Take in rows as they are and with true motion, float64[n, ROW] each."""
-        depth = -true[:, _ODOM + 2]
-        zone = np.where(depth > DIVES_M, 1, np.where(depth < SURFACES_M, -1, 0))
-        last = np.maximum.accumulate(np.where(zone != 0, np.arange(len(zone)), -1))
-        deep = np.where(last < 0, self._is_deep, zone[last] > 0)
-        turns = np.flatnonzero(np.diff(deep, prepend=self._is_deep))
-        edges = np.unique([0, *turns, len(log)])
-        for start, end in itertools.pairwise(edges.tolist()):
-            if start in turns:
-                self._turn(log[start], true[start], self._ticks + int(start))
-            if self._is_deep:
-                self._current += np.sum(log[start:end, _CURRENT : _CURRENT + 2], axis=0)
-                self._squares += float(np.sum(true[start:end, _E2] ** 2))
-                self._deep_ticks += end - start
-            elif self._waits_for_fix:
+        start = 0
+        while start < len(log):
+            end, self._way = _until_turn(log, true, start, self._is_deep, self._way)
+            if self._waits_for_fix:
                 self._look_for_fix(log[start:end])
+            if end < len(log):
+                self._turn(log[end], true[end], self._ticks + end)
+            start = end
         self._ticks += len(log)
 
     def _turn(self, row: np.ndarray, true: np.ndarray, tick: int) -> None:
@@ -67,16 +87,15 @@ class NavigationScorer:
         if self._is_deep:
             self._dive_tick = tick
             self._was_fixed = bool(self._surfacings) and not self._waits_for_fix
-            self._current, self._squares, self._deep_ticks = np.zeros(2), 0.0, 0
-            self._waits_for_fix = False
+            self._way, self._waits_for_fix = _Way(), False
             return
         believed = row[_BELIEVED : _BELIEVED + 2]
         if self._was_fixed and np.all(np.isfinite(believed)):  # what the way before told
             self._surfacings[-1]['dac_believed_mps'] = _north_east(believed)
             self._dac_errors.append(math.dist(believed, self._mean_current))
-        ticks = max(1, self._deep_ticks)
-        self._mean_current = self._current / ticks
-        self._ways.append(math.sqrt(self._squares / ticks))
+        ticks = max(1, self._way.ticks)
+        self._mean_current = np.array(self._way[:2]) / ticks
+        self._ways.append(math.sqrt(self._way.squares / ticks))
         place, (believed_place, covariance) = true[_PLACE].tolist(), _believed(row)
         off = _off_squared(place, believed_place, covariance)
         self._surfacings.append(

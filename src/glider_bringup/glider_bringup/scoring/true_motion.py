@@ -22,10 +22,15 @@ JUMP_M = 3.0
 _AWAY_M = 1.0
 
 
-def jumps(target: np.ndarray, before: np.ndarray) -> np.ndarray:
+@kernel
+def jumps(target, before):
     """Rows in which the virtual target, float64[n, 2], is on another path than a row earlier."""
-    steps = np.hypot(*np.diff(target, axis=0, prepend=before[np.newaxis]).T)
-    return np.flatnonzero(steps > JUMP_M)
+    is_jump = np.empty(len(target), np.bool_)
+    east, north = before[0], before[1]
+    for row in range(len(target)):
+        is_jump[row] = math.hypot(target[row, 0] - east, target[row, 1] - north) > JUMP_M
+        east, north = target[row, 0], target[row, 1]
+    return np.flatnonzero(is_jump)
 
 
 def told_course(row: np.ndarray) -> float | None:
