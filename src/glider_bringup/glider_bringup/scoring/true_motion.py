@@ -23,13 +23,17 @@ _AWAY_M = 1.0
 
 
 @kernel
-def jumps(target, before):
-    """Rows in which the virtual target, float64[n, 2], is on another path than a row earlier."""
-    is_jump = np.empty(len(target), np.bool_)
+def _mark_jumps(target, before, is_jump):
     east, north = before[0], before[1]
     for row in range(len(target)):
         is_jump[row] = math.hypot(target[row, 0] - east, target[row, 1] - north) > JUMP_M
         east, north = target[row, 0], target[row, 1]
+
+
+def jumps(target: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Rows in which the virtual target, float64[n, 2], is on another path than a row earlier."""
+    is_jump = np.empty(len(target), np.bool_)
+    _mark_jumps(target, before, is_jump)
     return np.flatnonzero(is_jump)
 
 
