@@ -106,7 +106,9 @@ def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
     for k in range(len(flags)):
         since_ns = stamps_ns[k] - told_ns  # less than nothing: a vehicle's clock was set back
         if not 0 <= since_ns < every_ns and _differs(flags[k], told):
-            told[:], told_ns = flags[k], stamps_ns[k]
+            for i in range(len(told)):  # a slice has numba load its text module
+                told[i] = flags[k, i]
+            told_ns = stamps_ns[k]
             found[count] = k
             count += 1
     return found[:count]
