@@ -128,7 +128,7 @@ class Flight:
     @property
     def tick(self) -> int:
         """Ticks flown."""
-        return self._held.tick
+        return self._held.past.tick
 
     @property
     def t_s(self) -> float:
@@ -300,7 +300,7 @@ class Flight:
         good = finite_rows(self._log[:rows])
         if good < rows:
             fault, is_over = fault_of(self._log[good], first + good), True
-            self._held.tick = first + good
+            self._held.past.tick = first + good
         log = self._log[:good]
         row, is_under = past.row, past.is_under
         if good:

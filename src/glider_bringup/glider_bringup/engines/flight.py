@@ -4,6 +4,7 @@
 
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -81,17 +82,25 @@ def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
     return state, MissionParams(*(block.params() for block in blocks))
 
 
+@dataclass
+class Past:
+    """What a mission has been told, and has told, until now."""
+
+    waiting: tuple[Order, ...]  #: those to come
+    tick: int = 0  #: ticks flown
+    stage: int = -1  #: of guidance, at the last one; -1: there was none
+    no_progress: int = 0  #: what guidance told of that then
+    battery: Battery = Battery(*WHEN_SILENT['battery'])  #: what it said then
+    own: tuple[Order, ...] = ()  #: what it orders itself by that, to come
+    #: what held until now, and whether it was given
+    followed: tuple[tuple[Order, bool], ...] = ()
+
+
 class Kept(NamedTuple):
     """A mission between two ticks; a value, which can be pickled."""
 
     mission: MissionState
-    tick: int  #: ticks flown
-    stage: int  #: of guidance, at the last one; -1: there was none
-    no_progress: int  #: what guidance told of that then
-    battery: Battery  #: what it said then
-    own: tuple[Order, ...]  #: what it orders itself by that, to come
-    followed: tuple[tuple[Order, bool], ...]  #: what held until now, and whether it was given
-    waiting: tuple[Order, ...]  #: those to come
+    past: Past
 
 
 class Held:
@@ -109,33 +118,20 @@ class Held:
     ) -> None:
         state, self._params = mission or mission_of(scenario)
         self._held = hold(state, self._params)
-        self.tick, self._stage, self._no_progress = 0, -1, 0
-        self._battery = Battery(*WHEN_SILENT['battery'])
         self._scenario, self._settings = scenario, scenario.guidance_settings()
-        self._own: tuple[Order, ...] = ()
-        self._followed: tuple[tuple[Order, bool], ...] = ()
-        self._waiting = tuple(scenario.orders)
+        self.past = Past(tuple(scenario.orders))
         self._followers = [taker for taker in takers if hasattr(taker, 'follow')]
         fly_held(self._held, np.empty((0, ROW)), TICK_S)
 
     def keep(self) -> Kept:
         """All that it is at this moment."""
-        return Kept(
-            mission=held_state(self._held),
-            tick=self.tick,
-            stage=self._stage,
-            no_progress=self._no_progress,
-            battery=self._battery,
-            own=self._own,
-            followed=self._followed,
-            waiting=self._waiting,
-        )
+        return Kept(held_state(self._held), replace(self.past))
 
     @property
     def status(self) -> Status:
         """How the mission goes, by guidance."""
         guidance = held_state(self._held).guidance
-        return status_of(guidance, self._settings.params(), self._battery)
+        return status_of(guidance, self._settings.params(), self.past.battery)
 
     def restore(self, kept: Kept) -> None:
         """Go on from there.
@@ -147,11 +143,9 @@ class Held:
             raise ConfigurationError(
                 'state: of another flight (allowed: of the same scenario and the same law)'
             )
-        self._tell(kept.followed)
+        self._tell(kept.past.followed)
         set_held(self._held, kept.mission)
-        self.tick, self._stage, self._waiting = kept.tick, kept.stage, kept.waiting
-        self._no_progress, self._own = kept.no_progress, kept.own
-        self._battery = kept.battery
+        self.past = replace(kept.past)
 
     def order(self, order: Order) -> None:
         """Take an order in.
@@ -160,21 +154,21 @@ class Held:
         """
         if held_state(self._held).guidance.profile.aborted:
             raise ConfigurationError('the mission is aborted (allowed: nothing more)')
-        waiting = (*self._waiting, order)
+        waiting = (*self.past.waiting, order)
         check_orders(self._settings, waiting, '')
-        self._waiting = waiting
+        self.past.waiting = waiting
 
     def fly(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, float64[n, ROW]; rows filled, and whether the mission has ended."""
         filled, is_over = 0, False
         while filled < len(log) and not is_over:
-            orders = due((*self._waiting, *self._own), self.tick, self._stage)
+            orders = due((*self.past.waiting, *self.past.own), self.past.tick, self.past.stage)
             for follower in self._followers if orders else ():
-                follower.follow(self.tick, orders)
+                follower.follow(self.past.tick, orders)
             for order in orders:
                 self._follow(order)
-            self._own = ()
-            ticks = int(min(len(log) - filled, ticks_alone(self._waiting, self.tick)))
+            self.past.own = ()
+            ticks = int(min(len(log) - filled, ticks_alone(self.past.waiting, self.past.tick)))
             try:
                 flown, is_over = self._until_told(log[filled : filled + ticks])
             except FlightError:
@@ -182,18 +176,18 @@ class Held:
                     break
                 raise
             filled += flown
-            self.tick += flown
+            self.past.tick += flown
             self._look(log[filled - 1])
         return filled, is_over
 
     def _until_told(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, but not beyond where an order waits for the surface, or is a reaction."""
-        waits = wait_for_surface(self._waiting, self.tick)
+        waits = wait_for_surface(self.past.waiting, self.past.tick)
         reacts = self._settings.no_progress != 'tell'
         before = held_state(self._held) if waits or reacts else None
         rows, is_over = self._until_raised(log)
         up = np.flatnonzero(is_surfaced(log[:rows, _STAGE])) if waits else ()
-        stays = begins(log[:rows, _NO_PROGRESS], self._no_progress) if reacts else ()
+        stays = begins(log[:rows, _NO_PROGRESS], self.past.no_progress) if reacts else ()
         last = min((int(found[0]) + 1 for found in (up, stays) if len(found)), default=rows)
         if last < rows:  # again, and no further
             set_held(self._held, before)
@@ -209,41 +203,41 @@ class Held:
                 return self._until_raised(log[: len(log) // 2])
             what = f'{type(error).__name__}: {error}'
             raise FlightError(
-                f'{what} at tick {self.tick} (t = {self.tick * TICK_S:.1f} s)'
+                f'{what} at tick {self.past.tick} (t = {self.past.tick * TICK_S:.1f} s)'
             ) from error
 
     def _look(self, row: np.ndarray) -> None:
         """Note what guidance and battery told at the last tick, and what it orders itself."""
-        before, self._no_progress = self._no_progress, int(row[_NO_PROGRESS])
-        self._stage, self._battery = int(row[_STAGE]), Battery(*row[_BATTERY].tolist())
-        if self._no_progress and not before:
-            order = reaction(self._settings, self._no_progress, row[_ODOM], self.tick)
-            self._own = (order,) if order else ()
+        before, self.past.no_progress = self.past.no_progress, int(row[_NO_PROGRESS])
+        self.past.stage, self.past.battery = int(row[_STAGE]), Battery(*row[_BATTERY].tolist())
+        if self.past.no_progress and not before:
+            order = reaction(self._settings, self.past.no_progress, row[_ODOM], self.past.tick)
+            self.past.own = (order,) if order else ()
 
     def _follow(self, order: Order) -> None:
         """Do what an order says."""
-        self._waiting = tuple(one for one in self._waiting if one is not order)
+        self.past.waiting = tuple(one for one in self.past.waiting if one is not order)
         if order.abort:
-            self._waiting = ()
+            self.past.waiting = ()
             state = held_state(self._held)
             set_held(self._held, state._replace(guidance=guidance_abort(state.guidance)))
             return
-        given = not any(one is order for one in self._own)
+        given = not any(one is order for one in self.past.own)
         try:
-            self._tell((*self._followed, (order, given)))
+            self._tell((*self.past.followed, (order, given)))
         except ConfigurationError:  # it made sense before guidance ordered itself something
             return
 
     def _tell(self, followed: tuple[tuple[Order, bool], ...]) -> None:
         """Fly on by orders that were followed."""
-        if followed == self._followed:
+        if followed == self.past.followed:
             return
-        settings, known = self._settings, len(self._followed)
-        if followed[:known] != self._followed:  # of a state of before, or of another flight
+        settings, known = self._settings, len(self.past.followed)
+        if followed[:known] != self.past.followed:  # of a state of before, or of another flight
             settings, known = self._scenario.guidance_settings(), 0
         for order, _ in followed[known:]:
             settings = changed(settings, order)
-        self._settings, self._followed = settings, followed
+        self._settings, self.past.followed = settings, followed
         # who ends the run knows what was ordered from outside, as over nodes
         outside = tuple(order for order, given in followed if given)
         ends = self._scenario.with_orders(outside).plant_settings().ends()
@@ -287,10 +281,10 @@ def _piloted(
         nonlocal last
         filled, is_over = 0, False
         while filled < len(log) and not is_over:
-            if held.tick % LOOK_TICKS == 0 and (order := pilot.order(held.tick, last)):
+            if held.past.tick % LOOK_TICKS == 0 and (order := pilot.order(held.past.tick, last)):
                 for one in (held, *(taker for taker in takers if hasattr(taker, 'order'))):
                     one.order(order)
-            ticks = LOOK_TICKS - held.tick % LOOK_TICKS
+            ticks = LOOK_TICKS - held.past.tick % LOOK_TICKS
             rows, is_over = held.fly(log[filled : filled + ticks])
             filled += rows
             last = log[filled - 1].copy()
