@@ -77,6 +77,24 @@ class Vector(NamedTuple):
     e: float
 
 
+@kernel
+def plus(a, b, times=1.0):
+    """A vector and another one, so many times."""
+    return Vector(a.n + times * b.n, a.e + times * b.e)
+
+
+@kernel
+def minus(a, b):
+    """A vector less another one."""
+    return Vector(a.n - b.n, a.e - b.e)
+
+
+@kernel
+def over(a, number):
+    """A vector over a number."""
+    return Vector(a.n / number, a.e / number)
+
+
 class Covariance(NamedTuple):
     """Of a horizontal vector."""
 

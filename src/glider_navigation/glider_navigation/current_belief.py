@@ -18,7 +18,7 @@ import math
 from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
-from glider_base.signals import Vector
+from glider_base.signals import Vector, plus
 from glider_model.ocean.current_settings import MAX_SPEED_MPS
 from glider_navigation.forecast import Trust, weigh
 
@@ -90,8 +90,7 @@ def initial_belief(tide: bool, mean_std: float = MEAN_STD) -> CurrentBelief:
 @kernel
 def _carried(belief, share):
     """Mean (m/s) after the stays since, of whose drift a share was the current's."""
-    mean, drifted = belief.mean, belief.drifted
-    return Vector(mean.n + share * drifted.n, mean.e + share * drifted.e)
+    return plus(belief.mean, belief.drifted, share)
 
 
 @kernel
@@ -100,21 +99,14 @@ def current_at(belief, t_s):
     mean = _carried(belief, belief.follows.share)
     if belief.p.aa <= 0.0:
         return mean
-    c, s = math.cos(TIDE * t_s), math.sin(TIDE * t_s)
-    return Vector(
-        mean.n + c * belief.cos.n + s * belief.sin.n,
-        mean.e + c * belief.cos.e + s * belief.sin.e,
-    )
+    return plus(plus(mean, belief.cos, math.cos(TIDE * t_s)), belief.sin, math.sin(TIDE * t_s))
 
 
 @kernel
 def last_mean(belief):
     """Mean (m/s) over the last way taken in, whatever the drift at the surface told since."""
-    mean, cos, sin, h = belief.mean, belief.cos, belief.sin, belief.over
-    return Vector(
-        mean.n + h.cos * cos.n + h.sin * sin.n,
-        mean.e + h.cos * cos.e + h.sin * sin.e,
-    )
+    h = belief.over
+    return plus(plus(belief.mean, belief.cos, h.cos), belief.sin, h.sin)
 
 
 @kernel
@@ -180,7 +172,7 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
     drifted = belief.drifted
     follows = weigh(belief.follows, off, drifted, s - _grown(belief, belief.gap_s))
     more = follows.share - belief.follows.share
-    off = Vector(off.n - more * drifted.n, off.e - more * drifted.e)
+    off = plus(off, drifted, -more)
     k_m, k_a, k_b = m / s, a / s, b / s
     q, weight = belief.q, belief.weight
     if belief.way_s > 0.0:
@@ -190,9 +182,9 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
         weight = min(MOST_WEIGHT, weight + 1.0)
     mean = _carried(belief, follows.share)
     return CurrentBelief(
-        mean=_bounded(Vector(mean.n + k_m * off.n, mean.e + k_m * off.e)),
-        cos=Vector(belief.cos.n + k_a * off.n, belief.cos.e + k_a * off.e),
-        sin=Vector(belief.sin.n + k_b * off.n, belief.sin.e + k_b * off.e),
+        mean=_bounded(plus(mean, off, k_m)),
+        cos=plus(belief.cos, off, k_a),
+        sin=plus(belief.sin, off, k_b),
         p=Uncertainty(
             mm=grown.mm - k_m * m,
             ma=grown.ma - k_m * a,
@@ -223,6 +215,6 @@ def carry(belief, change, stay_s, variance):
     if stay_s >= LONG_STAY_S:
         wander = belief.q * stay_s
         share = wander / (wander + variance)
-    n, e = belief.drifted.n + share * change.n, belief.drifted.e + share * change.e
+    drifted = plus(belief.drifted, change, share)
     known = min(1.0, share * belief.follows.share)
-    return replace(belief, drifted=Vector(n, e), gap_s=belief.gap_s + (1.0 - known) * stay_s)
+    return replace(belief, drifted=drifted, gap_s=belief.gap_s + (1.0 - known) * stay_s)

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
-from glider_base.signals import Vector
+from glider_base.signals import Vector, minus, over, plus
 
 #: Time from a fix that counts to the next (s).
 FIX_EVERY_S = 60.0
@@ -104,8 +104,7 @@ def change_of_drift(stay):
     by_fixes = 1.0 - variance / before if before > 0.0 else 0.0
     if by_fixes < LEAST_BY_FIXES:
         return Vector(0.0, 0.0), math.inf
-    n, e = stay.drift.n - stay.first_drift.n, stay.drift.e - stay.first_drift.e
-    return Vector(n / by_fixes, e / by_fixes), variance / by_fixes
+    return over(minus(stay.drift, stay.first_drift), by_fixes), variance / by_fixes
 
 
 @kernel
@@ -126,7 +125,7 @@ def wait(stay, dt):
         pv=k.pv + dt * (k.vv + 0.5 * DRIFT_WANDERS * dt),
         vv=k.vv + DRIFT_WANDERS * dt,
     )
-    place = Vector(stay.place.n + dt * stay.drift.n, stay.place.e + dt * stay.drift.e)
+    place = plus(stay.place, stay.drift, dt)
     return replace(stay, t_s=stay.t_s + dt, place=place, known=known)
 
 
@@ -136,14 +135,13 @@ def take_fix(stay, fix):
     k = stay.known
     s = k.pp + max(LEAST_VARIANCE, fix.variance)
     k_c, k_d, k_p, k_v = k.cp / s, k.dp / s, k.pp / s, k.pv / s
-    off_n, off_e = fix.p_n - stay.place.n, fix.p_e - stay.place.e
-    first = stay.first_drift
+    off = Vector(fix.p_n - stay.place.n, fix.p_e - stay.place.e)
     return replace(
         stay,
-        came_up=Vector(stay.came_up.n + k_c * off_n, stay.came_up.e + k_c * off_e),
-        place=Vector(stay.place.n + k_p * off_n, stay.place.e + k_p * off_e),
-        first_drift=Vector(first.n + k_d * off_n, first.e + k_d * off_e),
-        drift=Vector(stay.drift.n + k_v * off_n, stay.drift.e + k_v * off_e),
+        came_up=plus(stay.came_up, off, k_c),
+        place=plus(stay.place, off, k_p),
+        first_drift=plus(stay.first_drift, off, k_d),
+        drift=plus(stay.drift, off, k_v),
         known=Known(
             cc=k.cc - k_c * k.cp,
             cp=k.cp - k_c * k.pp,
@@ -182,7 +180,7 @@ def _begin_aside(stay, variance):
     then = replace(
         stay,
         t_s=t,
-        came_up=Vector(fix.n - t * drift.n, fix.e - t * drift.e),
+        came_up=plus(fix, drift, -t),
         place=fix,
         first_drift=drift,
         known=Known(

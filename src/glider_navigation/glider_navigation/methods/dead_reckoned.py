@@ -16,7 +16,7 @@ from pydantic import Field
 from glider_base.frames import odometry_to_wire, quaternion_from_euler, rotate_to_body
 from glider_base.kernel import kernel, replace
 from glider_base.settings import number
-from glider_base.signals import Covariance, Odometry, Vector
+from glider_base.signals import Covariance, Odometry, Vector, minus, over, plus
 from glider_model.onboard.fix_watch import DIVES_M, SURFACES_M
 from glider_model.onboard.glide_polar import Polar, make_polar
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
@@ -135,15 +135,13 @@ def _regressors(way):
 @kernel
 def _unlike(way, current):
     """Mean velocity through the water less that of the last way: its errors are new (m/s)."""
-    t = max(1.0, way.t_s)
-    return Vector(way.through.n / t - current.glide.n, way.through.e / t - current.glide.e)
+    return minus(over(way.through, max(1.0, way.t_s)), current.glide)
 
 
 @kernel
 def _change_of_forecast(way, column):
     """Mean of the forecast over a way less that of the last way (m/s)."""
-    t = max(1.0, way.t_s)
-    return Vector(way.forecast.n / t - column.n, way.forecast.e / t - column.e)
+    return minus(over(way.forecast, max(1.0, way.t_s)), column)
 
 
 @kernel
@@ -170,10 +168,7 @@ def _learn(current, trust, column, way, stay, params):
     if way.t_s < SHORTEST_WAY_S or not params.believes_current:
         return current, trust
     t = way.t_s
-    off = Vector(
-        (stay.came_up.n - way.begun.n - way.through.n - way.believed.n) / t,
-        (stay.came_up.e - way.begun.e - way.through.e - way.believed.e) / t,
-    )
+    off = over(minus(minus(minus(stay.came_up, way.begun), way.through), way.believed), t)
     h, variance = _regressors(way), (way.variance + stay.known.cc) / (t * t)
     bias = 0.5 * (params.speed_variance + params.heading_variance)
     bias *= squared(_unlike(way, current))
@@ -182,11 +177,10 @@ def _learn(current, trust, column, way, stay, params):
         noise = belief.mean_variance(current, h) + belief.wandered(current, t) + bias + variance
         weighed = weigh(trust, off, change, noise)
         more = weighed.share - trust.share
-        off = Vector(off.n - more * change.n, off.e - more * change.e)
-        mean = Vector(current.mean.n - more * column.n, current.mean.e - more * column.e)
-        current, trust = replace(current, mean=mean), weighed
-    through = Vector(way.through.n / t, way.through.e / t)
-    return belief.take_in(current, off, h, t, through, variance, bias), trust
+        off = plus(off, change, -more)
+        current = replace(current, mean=plus(current.mean, column, -more))
+        trust = weighed
+    return belief.take_in(current, off, h, t, over(way.through, t), variance, bias), trust
 
 
 @kernel
@@ -194,10 +188,7 @@ def _dive(way, stay):
     """The way that begins with a dive: a new one, if the stay had a fix."""
     if stay.fixes > 0:
         return replace(_NO_WAY, begun=stay.place, variance=stay.known.pp)
-    drifted = Vector(
-        way.through.n + stay.place.n - stay.came_up.n,
-        way.through.e + stay.place.e - stay.came_up.e,
-    )
+    drifted = minus(plus(way.through, stay.place), stay.came_up)
     more = surface_stay.drifted_variance(stay)
     return replace(way, variance=way.variance + more, through=drifted)
 
@@ -207,9 +198,9 @@ def _go_on(way, through, current, told, t_s, dt):
     """The way a tick later, at velocities through the water, of current and forecast (m/s)."""
     return replace(
         way,
-        through=Vector(way.through.n + dt * through.n, way.through.e + dt * through.e),
-        believed=Vector(way.believed.n + dt * current.n, way.believed.e + dt * current.e),
-        forecast=Vector(way.forecast.n + dt * told.n, way.forecast.e + dt * told.e),
+        through=plus(way.through, through, dt),
+        believed=plus(way.believed, current, dt),
+        forecast=plus(way.forecast, told, dt),
         t_s=way.t_s + dt,
         cos_s=way.cos_s + dt * math.cos(TIDE * t_s),
         sin_s=way.sin_s + dt * math.sin(TIDE * t_s),
@@ -217,23 +208,16 @@ def _go_on(way, through, current, told, t_s, dt):
 
 
 @kernel
-def _water(learnt, told, trust):
-    """Current (m/s) that is believed, of what was learnt and what is forecast."""
-    return Vector(learnt.n + trust.share * told.n, learnt.e + trust.share * told.e)
-
-
-@kernel
 def _at_the_top(place, t_s, current, trust, params):
     """Current (m/s) that is believed for a place at the surface (m) and a time (s)."""
     told = forecast_at(params.forecast, place, 0.0, t_s)
-    return _water(belief.current_at(current, t_s), told, trust)
+    return plus(belief.current_at(current, t_s), told, trust.share)
 
 
 @kernel
 def _unforeseen(drift, place, t_s, current, trust, params):
     """A drift (m/s) at a place (m) and time (s), less the water that is believed to be there."""
-    water = _at_the_top(place, t_s, current, trust, params)
-    return Vector(drift.n - water.n, drift.e - water.e)
+    return minus(drift, _at_the_top(place, t_s, current, trust, params))
 
 
 @kernel
@@ -243,20 +227,15 @@ def _carry(current, trust, stay, t_s, params):
         return current
     first = stay.first_drift
     more, variance = surface_stay.change_of_drift(stay)
-    last = Vector(first.n + more.n, first.e + more.e)
     then = _unforeseen(first, stay.came_up, t_s - stay.t_s, current, trust, params)
-    now = _unforeseen(last, stay.place, t_s, current, trust, params)
-    change = Vector(now.n - then.n, now.e - then.e)
-    return belief.carry(current, change, stay.t_s, variance)
+    now = _unforeseen(plus(first, more), stay.place, t_s, current, trust, params)
+    return belief.carry(current, minus(now, then), stay.t_s, variance)
 
 
 @kernel
 def _end_of(way):
     """Where a way has led to (m)."""
-    return Vector(
-        way.begun.n + way.through.n + way.believed.n,
-        way.begun.e + way.through.e + way.believed.e,
-    )
+    return plus(plus(way.begun, way.through), way.believed)
 
 
 @kernel
@@ -275,7 +254,7 @@ def _change_over(state, under, t_s, params):
         if stay.fixes > 0:
             current, trust = _learn(current, trust, column, way, stay, params)
             if way.t_s >= SHORTEST_WAY_S:
-                column = Vector(way.forecast.n / way.t_s, way.forecast.e / way.t_s)
+                column = over(way.forecast, way.t_s)
             current = _carry(current, trust, stay, t_s, params)
         way = _dive(way, stay)
     elif state.under and not under:
@@ -337,9 +316,9 @@ def dead_reckoned_step(state, heard, params, dt):
         psi = attitude.angles.psi
         through = Vector(flight.speed * math.cos(psi), flight.speed * math.sin(psi))
         told = forecast_at(params.forecast, state.place, flight.depth, t_s)
-        water = _water(belief.current_at(current, t_s), told, trust)
+        water = plus(belief.current_at(current, t_s), told, trust.share)
         way = _go_on(way, through, water, told, t_s, dt)
-        place, velocity = _end_of(way), Vector(through.n + water.n, through.e + water.e)
+        place, velocity = _end_of(way), plus(through, water)
         covariance = place_covariance(way, current, trust, column, params)
         phase = UNDER_WATER
     else:
@@ -353,7 +332,7 @@ def dead_reckoned_step(state, heard, params, dt):
     believed = Believed(
         odom=_odometry(place, attitude, flight, velocity),
         place=covariance,
-        current=_water(belief.last_mean(current), column, trust),
+        current=plus(belief.last_mean(current), column, trust.share),
         current_covariance=Covariance(wandering, 0.0, wandering),
         surface=stay.drift,
         surface_covariance=Covariance(stay.known.vv, 0.0, stay.known.vv),
