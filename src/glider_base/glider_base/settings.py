@@ -208,6 +208,15 @@ def holder_of(values: dict[str, Any], name: str) -> dict[str, Any]:
     return inside
 
 
+def leaves(values: dict[str, Any], before: str = '') -> Iterator[tuple[str, Any]]:
+    """Everything in nested mappings that is none itself, with its dotted name."""
+    for name, value in values.items():
+        if isinstance(value, dict):
+            yield from leaves(value, f'{before}{name}.')
+        else:
+            yield f'{before}{name}', value
+
+
 def unit_of(field: pydantic.fields.FieldInfo) -> str:
     """Unit of a field, from the first brackets of its description; empty without."""
     brackets = re.search(r'\(((?:[^()]|\([^()]*\))+)\)', field.description or '')

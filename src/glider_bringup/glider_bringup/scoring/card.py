@@ -3,14 +3,14 @@
 """The scorecard as data, which is ``score.json``: made, written, read and checked."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model, model_validator
 
 from glider_base.files import is_file, read_json
-from glider_base.settings import ConfigurationError, mistakes
+from glider_base.settings import ConfigurationError, leaves, mistakes
 from glider_bringup.engines.flight import Outcome, Taker, fly
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.disk import write_whole
@@ -44,7 +44,8 @@ def fly_scored(scenario: Scenario, takers: Iterable[Taker] = ()) -> tuple[Outcom
 
 def scorecard(scenario: Scenario, engine: str | None, flight: Outcome, scores: dict) -> dict:
     """Contents of ``score.json``; a figure that is not `finite` is None there, and a failure."""
-    scores, wrong = dict(scores), list(_not_finite(scores))
+    scores = dict(scores)
+    wrong = [name for name, figure in leaves(scores) if figure != finite(figure)]
     status, reason = became, why = scores.pop('status'), scores.pop('reason')
     if flight.status != 'completed':
         status, reason = flight.status, flight.reason
@@ -80,15 +81,6 @@ def finite(value: Any) -> Any:
     if isinstance(value, list):
         return [finite(inner) for inner in value]
     return None if isinstance(value, float) and not abs(value) < LARGEST else value
-
-
-def _not_finite(scores: dict) -> Iterator[str]:
-    """Dotted names of the figures that are not finite."""
-    for name, value in scores.items():
-        if isinstance(value, dict):
-            yield from (f'{name}.{inner}' for inner in _not_finite(value))
-        elif value != finite(value):
-            yield name
 
 
 def write_score(folder: Path, card: dict) -> None:

@@ -3,12 +3,11 @@
 """Runs side by side: their scores, what their scenarios differ in, and one page over the other."""
 
 import math
-from collections.abc import Iterator
 from itertools import compress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from glider_base.settings import ConfigurationError
+from glider_base.settings import ConfigurationError, leaves
 from glider_bringup.scoring.card import STOPPED
 from glider_bringup.scoring.scores import Score, reckoned, told_in
 from glider_bringup.showing.panels import ACTUATORS, FLOWN, SPACE, SURFACE, flown_panel
@@ -43,15 +42,6 @@ def labels(folders: list[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [str(folder) for folder in folders]
 
 
-def _fields(values: Any, name: str = '') -> Iterator[tuple[str, Any]]:
-    """Every number and word in nested values, with its dotted name."""
-    if isinstance(values, dict):
-        for key, inner in values.items():
-            yield from _fields(inner, f'{name}.{key}' if name else key)
-    else:
-        yield name, values
-
-
 def differences(runs: list[FlownRun]) -> list[dict[str, Any]]:
     """Fields in which the scenarios of runs, or their vehicles, are not all the same.
 
@@ -64,7 +54,7 @@ def differences(runs: list[FlownRun]) -> list[dict[str, Any]]:
             mode='json', exclude={'vehicle', 'description', 'changed'}
         )
         vehicle = run.vehicle.model_dump(mode='json', exclude={'description'})
-        flat.append(dict(_fields({**values, 'vehicle': vehicle})))
+        flat.append(dict(leaves({**values, 'vehicle': vehicle})))
     names = dict.fromkeys(name for fields in flat for name in fields)
     return [
         {'field': name, 'values': [fields.get(name) for fields in flat]}

@@ -13,7 +13,7 @@ from socket import gethostname
 from typing import Any, NamedTuple
 
 from glider_base.kernel import source_digest
-from glider_base.settings import ConfigurationError
+from glider_base.settings import ConfigurationError, leaves
 from glider_base.signals import TICK_S
 from glider_bringup.door.netcdf import write_dataset
 from glider_bringup.engines.flight import Outcome
@@ -100,7 +100,7 @@ def failure(reason: str) -> dict[str, Any]:
 
 def judge(card: dict[str, Any]) -> dict[str, Any]:
     """Record of a cell from its scorecard; figures that are not finite make it a failure."""
-    figures = dict(_figures(card))
+    figures = _figures(card)
     wrong = [name for name, figure in figures.items() if finite(figure) != figure]
     status, reason = card['status'], card['reason']
     if wrong:
@@ -112,15 +112,14 @@ def judge(card: dict[str, Any]) -> dict[str, Any]:
     return {'status': status, 'reason': reason[:REASON_LENGTH], 'figures': figures}
 
 
-def _figures(card: dict[str, Any], before: str = '') -> Iterator[tuple[str, Any]]:
+def _figures(card: dict[str, Any]) -> dict[str, Any]:
     """Numbers and vectors of a scorecard by dotted name; None where one has no data."""
-    for name, value in card.items():
-        if name in NOT_RESULTS:
-            continue
-        if isinstance(value, dict):
-            yield from _figures(value, f'{before}{name}.')
-        elif not isinstance(value, str | list) or before + name in VECTORS:
-            yield before + name, value
+    return {
+        name: value
+        for name, value in leaves(card)
+        if NOT_RESULTS.isdisjoint(name.split('.'))
+        and (not isinstance(value, str | list) or name in VECTORS)
+    }
 
 
 # ---------------------------------------------------------------------------------- here
@@ -130,7 +129,7 @@ def result_names(scenario: Scenario) -> set[str]:
     """Names in a result, apart from its dimensions; a scorecard without a flight has them too."""
     empty = Scorer(scenario).result(Rules())
     card = scorecard(scenario, 'direct', Outcome('completed', '', 0.0, 0, 0), empty)
-    return NOT_FIGURES | {variable_name(figure) for figure, _ in _figures(card)}
+    return NOT_FIGURES | set(map(variable_name, _figures(card)))
 
 
 def open_journal(plan: Plan, folder: Path, resume: bool) -> Journal:
