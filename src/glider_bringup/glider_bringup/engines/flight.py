@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One flight by the direct engine: its rows go to whoever takes them. Nothing of ROS is needed."""
 
+import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -107,7 +108,7 @@ class Held:
     """A mission between two ticks, where compiled code finds it, and the orders that it follows.
 
     ``mission`` is flown instead of `mission_of` the scenario; the takers that ``follow`` orders
-    are told of them.
+    are told of them, and those that take an ``order`` of what a ``pilot`` gives.
     """
 
     def __init__(
@@ -115,12 +116,15 @@ class Held:
         scenario: Scenario,
         mission: tuple[MissionState, MissionParams] | None = None,
         takers: Iterable[Taker] = (),
+        pilot: Pilot | None = None,
     ) -> None:
         state, self._params = mission or mission_of(scenario)
         self._held = hold(state, self._params)
         self._scenario, self._settings = scenario, scenario.guidance_settings()
         self.past = Past(tuple(scenario.orders))
+        self._pilot, self._row = pilot, None
         self._followers = [taker for taker in takers if hasattr(taker, 'follow')]
+        self._hearers = [taker for taker in takers if hasattr(taker, 'order')]
         fly_held(self._held, np.empty((0, ROW)), TICK_S)
 
     def keep(self) -> Kept:
@@ -162,13 +166,17 @@ class Held:
         """Fill a log, float64[n, ROW]; rows filled, and whether the mission has ended."""
         filled, is_over = 0, False
         while filled < len(log) and not is_over:
+            if self._pilot:
+                self._ask(self._pilot)
             orders = due((*self.past.waiting, *self.past.own), self.past.tick, self.past.stage)
             for follower in self._followers if orders else ():
                 follower.follow(self.past.tick, orders)
             for order in orders:
                 self._follow(order)
             self.past.own = ()
-            ticks = int(min(len(log) - filled, ticks_alone(self.past.waiting, self.past.tick)))
+            alone = ticks_alone(self.past.waiting, self.past.tick)
+            look = LOOK_TICKS - self.past.tick % LOOK_TICKS if self._pilot else math.inf
+            ticks = int(min(len(log) - filled, alone, look))
             try:
                 flown, is_over = self._until_told(log[filled : filled + ticks])
             except FlightError:
@@ -179,6 +187,13 @@ class Held:
             self.past.tick += flown
             self._look(log[filled - 1])
         return filled, is_over
+
+    def _ask(self, pilot: Pilot) -> None:
+        """Take in the order that a pilot gives now, if any."""
+        tick = self.past.tick
+        if tick % LOOK_TICKS == 0 and (order := pilot.order(tick, self._row)):
+            for one in (self, *self._hearers):
+                one.order(order)
 
     def _until_told(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, but not beyond where an order waits for the surface, or is a reaction."""
@@ -208,6 +223,7 @@ class Held:
 
     def _look(self, row: np.ndarray) -> None:
         """Note what guidance and battery told at the last tick, and what it orders itself."""
+        self._row = row.copy()
         before, self.past.no_progress = self.past.no_progress, int(row[_NO_PROGRESS])
         self.past.stage, self.past.battery = int(row[_STAGE]), Battery(*row[_BATTERY].tolist())
         if self.past.no_progress and not before:
@@ -271,28 +287,6 @@ def refuse_planned_route(scenario: Scenario) -> None:
         )
 
 
-def _piloted(
-    held: Held, pilot: Pilot, takers: Iterable[Taker]
-) -> Callable[[np.ndarray], tuple[int, bool]]:
-    """Fill a log as `Held.fly` does, by the orders of a pilot too, of which takers hear."""
-    last: np.ndarray | None = None
-
-    def advance(log: np.ndarray) -> tuple[int, bool]:
-        nonlocal last
-        filled, is_over = 0, False
-        while filled < len(log) and not is_over:
-            if held.past.tick % LOOK_TICKS == 0 and (order := pilot.order(held.past.tick, last)):
-                for one in (held, *(taker for taker in takers if hasattr(taker, 'order'))):
-                    one.order(order)
-            ticks = LOOK_TICKS - held.past.tick % LOOK_TICKS
-            rows, is_over = held.fly(log[filled : filled + ticks])
-            filled += rows
-            last = log[filled - 1].copy()
-        return filled, is_over
-
-    return advance
-
-
 def fly(
     scenario: Scenario,
     takers: Iterable[Taker] = (),
@@ -314,9 +308,8 @@ def fly(
         pilot = Pilot(scenario) if scenario.guidance.route == 'planned' else None
         start = time.perf_counter()
         try:
-            held = Held(scenario, (state, params), takers)
-            advance = _piloted(held, pilot, takers) if pilot else held.fly
-            for log in blocks_of(advance, TAKEN_TICKS):
+            held = Held(scenario, (state, params), takers, pilot)
+            for log in blocks_of(held.fly, TAKEN_TICKS):
                 for taker in takers:
                     taker.add(log)
                 ticks += len(log)
