@@ -18,6 +18,7 @@ from glider_bringup.engines.direct import FlightError
 from glider_control.law import LawSettings, law_step
 from glider_guard.rows import LATCHED
 from glider_guidance.settings import GuidanceSettings
+from glider_mission.routing.pilot import LOOK_TICKS
 
 WATERS = {
     'rough_water': {},
@@ -234,6 +235,13 @@ def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up(raises):
         'current_8deg', {**fields, 'control.FailingLaw.at': at}, law=FailingLaw
     ).score
     assert (score['status'], score['reason'], score['ticks']) == ('failed', said, flight.tick)
+
+
+def test_a_law_that_raises_on_a_planned_route_ends_it_at_that_tick():
+    failing = {'control.FailingLaw.at': 1000, 'control.FailingLaw.raises': True}
+    fields = {**failing, 'orders': [], 'guidance.route': 'planned'}
+    score = glider.fly('eddies_10d', fields, law=FailingLaw, duration=3600.0).score
+    assert f' at tick {score["ticks"]} ' in score['reason'] and score['ticks'] % LOOK_TICKS
 
 
 @pytest.mark.parametrize(
