@@ -315,13 +315,21 @@ def _stems(folder: Path) -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in folder.glob('*.yaml')))
 
 
-def find_file(what: str, name: str, folder: Path) -> Path:
+def path_of(argument: str, value: Any) -> Path:
+    """Path that a program gave as an argument; a ConfigurationError if it is none."""
+    if not isinstance(value, str | Path) or '\0' in str(value):
+        raise ConfigurationError(f'{argument} = {shown(value)}: not usable (allowed: a path)')
+    return Path(value)
+
+
+def find_file(what: str, name: str | Path, folder: Path) -> Path:
     """File of a scenario, vehicle or the like, given by name or by path.
 
     Raises ConfigurationError if neither ``folder`` has a file of that name nor there is such a
     file.
     """
-    path, names = Path(name), file_names(folder)
+    name, names = str(name), file_names(folder)
+    path = Path(name)
     if name in names:
         return folder / f'{name}.yaml'
     if path.suffix not in ('.yaml', '.yml'):

@@ -336,18 +336,54 @@ def test_mistake_is_told_in_the_words_of_the_command_line(case):
     assert str(error.value) == str(told.exception)
 
 
+SPEEDS = {'current.speed_kn': [0.0]}
+
+
 @pytest.mark.parametrize(
-    ('choices', 'text'),
+    ('call', 'text'),
     [
-        ({'engine': 'rocket'}, '--engine rocket: unknown (allowed: nodes, direct)'),
-        ({'bag': True}, '--bag: a bag needs a run folder'),
-        ({'controller': 'fuzzy'}, "control.law = 'fuzzy'"),
+        (lambda: glider.fly(engine='rocket'), '--engine rocket: unknown (allowed: nodes, direct)'),
+        (lambda: glider.fly(bag=True), '--bag: a bag needs a run folder'),
+        (lambda: glider.fly(controller='fuzzy'), "control.law = 'fuzzy'"),
+        (lambda: glider.fly(out=3), 'out = 3: not usable (allowed: a path)'),
+        (lambda: glider.fly(out='a\0'), "out = 'a\\x00': not usable (allowed: a path)"),
+        (
+            lambda: glider.fly(set=[]),
+            'set = []: not usable (allowed: values by dotted field name)',
+        ),
+        (lambda: glider.load_scenario(3), "scenario = '3': no such scenario (allowed: current"),
+        (lambda: glider.load_scenario('helix', 3), 'changes = 3: not usable (allowed: values by'),
+        (lambda: glider.open_run(None), 'path = None: not usable (allowed: a path)'),
+        (
+            lambda: glider.sweep(SPEEDS, set=[1]),
+            'set = [1]: not usable (allowed: values by dotted',
+        ),
+        (lambda: glider.sweep(SPEEDS, out=3), 'out = 3: not usable (allowed: a path)'),
+        (lambda: glider.sweep(SPEEDS, workers=10**9), 'not usable (allowed: 1 to 1024)'),
+        (lambda: glider.sweep(SPEEDS, workers=2, scheduler='x:1'), 'not with --scheduler'),
+        (lambda: glider.sweep({3: [0]}), 'dimensions.3.field = 3: should be a valid string'),
+        (lambda: glider.sweep({'seed': [object()]}), 'not usable (allowed: numbers, texts, true'),
     ],
 )
-def test_mistake_is_told(choices, text):
+def test_mistake_is_told(call, text, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(ConfigurationError) as error:
-        glider.fly(**choices)
+        call()
     assert text in str(error.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_value_of_an_axis_that_is_none_is_told_in_a_line():
+    with pytest.raises(ConfigurationError) as error:
+        glider.sweep({'current.speed_kn': [0.0, float('nan')]})
+    says = 'nan: not usable (allowed: numbers, texts, true, false)'
+    assert str(error.value).endswith(f'current_speed_kn.values = [0.0, nan]: {says}')
+
+
+def test_addresses_that_are_none_do_not_end_the_sweeps_to_come():
+    for _ in range(3):
+        with pytest.raises(ConfigurationError, match='--scheduler 3: no Dask scheduler answers'):
+            glider.sweep(SPEEDS, scheduler=3)
 
 
 def test_field_of_a_loaded_scenario_is_validated_too(flown):
@@ -742,8 +778,8 @@ def test_sweep_of_a_mapping_is_that_of_its_file(tmp_path):
     with pytest.raises(glider.ConfigurationError, match='no field'):
         glider.sweep({})
     for choices, text in (
-        ({'workers': 0}, 'workers = 0: .*allowed: 1 and more'),
-        ({'workers': '2'}, "workers = '2': .*allowed: 1 and more"),
+        ({'workers': 0}, 'workers = 0: .*allowed: 1 to 1024'),
+        ({'workers': '2'}, "workers = '2': .*allowed: 1 to 1024"),
         ({'scenario': 'current_8deg'}, 'has one of its own'),
     ):
         with pytest.raises(glider.ConfigurationError, match=text):

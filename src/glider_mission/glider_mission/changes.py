@@ -4,7 +4,7 @@
 
 import json
 import shlex
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from copy import deepcopy
 from typing import Any
 
@@ -27,13 +27,22 @@ _ALTERNATIVES = (
 )
 
 
+def given_fields(fields: Any, argument: str = 'set') -> dict[str, Any]:
+    """Values by dotted name that a program gave; a ConfigurationError names its argument."""
+    if not isinstance(fields, Mapping | None):
+        raise ConfigurationError(
+            f'{argument} = {shown(fields)}: not usable (allowed: values by dotted field name)'
+        )
+    return dict(fields or {})
+
+
 def plain(value: Any) -> Any:
-    """A value without NumPy: numbers and lists are told as others are."""
+    """A value without arrays: numbers and lists are told as others are."""
     if isinstance(value, dict):
         return {name: plain(inner) for name, inner in value.items()}
     if isinstance(value, list | tuple):
         return [plain(inner) for inner in value]
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    return np.asarray(value).tolist() if hasattr(value, '__array__') else value
 
 
 def split_changes(changes: dict[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

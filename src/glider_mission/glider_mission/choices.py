@@ -4,7 +4,7 @@
 
 from typing import Any, NamedTuple
 
-from glider_base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError, clipped
 from glider_base.signals import TICK_S
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
@@ -42,7 +42,7 @@ def number(option: str, text: str, word: str, low: float, high: float) -> float:
         number = float('nan')
     if not low <= number <= high:
         raise ConfigurationError(
-            f'{option}{text}: not usable (allowed: {low:g} to {high:g}, or {word})'
+            f'{option}{clipped(text)}: not usable (allowed: {low:g} to {high:g}, or {word})'
         )
     return number
 

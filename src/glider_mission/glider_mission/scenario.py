@@ -36,7 +36,15 @@ from glider_guidance.orders import check_orders
 from glider_guidance.path.settings import MAX_DEPTH_M, PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
-from glider_mission.changes import VEHICLE, overlap, plain, set_field, split_changes, told_fields
+from glider_mission.changes import (
+    VEHICLE,
+    given_fields,
+    overlap,
+    plain,
+    set_field,
+    split_changes,
+    told_fields,
+)
 from glider_mission.chart import charted, in_metres, uncharted
 from glider_mission.mafiles import from_folder, with_mafiles
 from glider_mission.rules import Rules
@@ -466,7 +474,7 @@ def scenario_names() -> list[str]:
     return file_names(SCENARIO_FOLDER)
 
 
-def scenario_path(name: str) -> Path:
+def scenario_path(name: str | Path) -> Path:
     """File of a scenario given by name or by path; errors as `find_file`."""
     return find_file('scenario', name, SCENARIO_FOLDER)
 
@@ -483,7 +491,7 @@ def name_after(path: Path) -> str:
     return re.sub(r'^[.-]|[^\w.-]', '_', path.stem, flags=re.ASCII)[:100]
 
 
-def read_scenario(name: str = DEFAULT_SCENARIO) -> ScenarioSource:
+def read_scenario(name: str | Path = DEFAULT_SCENARIO) -> ScenarioSource:
     """Read the file of a scenario given by name or by path; `make_scenario` validates it.
 
     Errors are those of `scenario_path` and `read_yaml`.
@@ -508,7 +516,11 @@ def make_scenario(
     default the last one that this program brought by that name. A ConfigurationError names file,
     field, value and allowed range.
     """
-    path, values, changes = source.path, deepcopy(source.values), plain(changes or {})
+    path, values, changes = (
+        source.path,
+        deepcopy(source.values),
+        plain(given_fields(changes, 'changes')),
+    )
     own, in_vehicle = split_changes(changes)
     fields = {field: shown(value) for field, value in changes.items()}
     for field, value in own.items():
@@ -653,7 +665,9 @@ def check_starts(starts: dict[str, float | None]) -> None:
 
 
 def load_scenario(
-    name: str = DEFAULT_SCENARIO, changes: dict[str, Any] | None = None, recorded: bool = False
+    name: str | Path = DEFAULT_SCENARIO,
+    changes: dict[str, Any] | None = None,
+    recorded: bool = False,
 ) -> Scenario:
     """Scenario by name or path, with some of its fields changed; see `make_scenario`."""
     return make_scenario(read_scenario(name), changes, recorded)

@@ -9,12 +9,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
 import xarray
 
 from glider_base.errors import ConfigurationError, shown
+from glider_base.settings import path_of
 from glider_bringup.console import compiling, counter
 from glider_bringup.door.netcdf import read_dataset
+from glider_mission.changes import given_fields, plain
 from glider_mission.scenario import DEFAULT_SCENARIO, scenario_names, scenario_path
 from glider_studies.sweep import fly as study
 from glider_studies.sweep.plan import Plan, load_sweep
@@ -28,26 +29,22 @@ def _plan(
     if not isinstance(name, Mapping):
         if scenario is not None:
             raise ConfigurationError(
-                f'scenario {scenario}: the sweep {name} has one of its own (allowed: with a '
-                'mapping of fields)'
+                f'scenario {scenario!s:.80}: the sweep {name!s:.80} has one of its own (allowed: '
+                'with a mapping of fields)'
             )
-        return load_sweep(str(name), changes)
+        return load_sweep(name, changes)
     if not name:
         raise ConfigurationError('sweep: no field to go through (allowed: one or more)')
     for field, values in name.items():
         if isinstance(values, str) or not isinstance(values, Iterable):
             raise ConfigurationError(
-                f'sweep: {field} = {shown(values)}: not usable (allowed: a list of values)'
+                f'sweep: {field!s:.80} = {shown(values)}: not usable (allowed: a list of values)'
             )
     dimensions = {
-        field.replace('.', '_'): {
-            'kind': 'values',
-            'field': field,
-            'values': np.asarray(list(values)).tolist(),
-        }
-        for field, values in name.items()
+        str(one).replace('.', '_'): {'kind': 'values', 'field': one, 'values': plain(list(values))}
+        for one, values in name.items()
     }
-    over = str(scenario or DEFAULT_SCENARIO)
+    over = str(DEFAULT_SCENARIO if scenario is None else scenario)
     if over not in scenario_names():
         over = str(scenario_path(over).resolve())
     return Plan(Path('sweep.yaml'), changes, {'scenario': over, 'dimensions': dimensions})
@@ -101,12 +98,12 @@ def sweep(
     ConfigurationError
         Naming file, field, value and allowed range.
     """
-    if workers is not None and not (isinstance(workers, Integral) and workers >= 1):
-        raise ConfigurationError(f'workers = {shown(workers)}: not usable (allowed: 1 and more)')
-    plan = _plan(name, scenario, dict(set or {}))
+    if workers is not None and not (isinstance(workers, Integral) and 1 <= workers <= 1024):
+        raise ConfigurationError(f'workers = {shown(workers)}: not usable (allowed: 1 to 1024)')
+    plan = _plan(name, scenario, given_fields(set))
     bar = counter('flying', plan.cells) if progress else nullcontext(lambda done: None)
     with nullcontext(out) if out is not None else TemporaryDirectory() as place:
-        folder = Path(place)
+        folder = path_of('out', place)
         with study.open_journal(plan, folder, resume) as journal:
             known = study.flown_cells(plan, journal)
             if not all(known):

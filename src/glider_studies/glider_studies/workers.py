@@ -23,6 +23,7 @@ import dask
 import typer
 from distributed import Client, Future, LocalCluster, TimeoutError, wait
 from distributed.client import ClosedClientError
+from distributed.comm import get_address_host_port
 from distributed.scheduler import KilledWorker
 
 from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError
@@ -230,8 +231,13 @@ def worker_pool(
     Whatever ends the block ends the workers that were started for it, at once. ``scheduler`` is
     the address of that of a cluster, such as ``tcp://10.0.0.1:8786``. Loops for ``combinations``,
     which they will fly, are compiled here, so that workers of this machine do not all compile the
-    same; ``tell`` gets a line then. Raises ConfigurationError if no scheduler answers.
+    same; ``tell`` gets a line then. Raises ConfigurationError if no scheduler answers, or there
+    are ``workers`` beside it.
     """
+    if workers and scheduler:
+        raise ConfigurationError(
+            f'--workers {workers}: not with --scheduler, whose cluster has workers of its own'
+        )
     dask_setup()
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(_CONFIG))
@@ -246,10 +252,12 @@ def worker_pool(
 
 def _connect(scheduler: str | LocalCluster) -> Client:
     try:
+        if not isinstance(scheduler, LocalCluster):
+            get_address_host_port(str(scheduler))  # a client that fails for it leaves others none
         return Client(scheduler, timeout=CONNECT_S)
     except (OSError, TimeoutError, ValueError) as error:
         raise ConfigurationError(
-            f'--scheduler {scheduler}: no Dask scheduler answers there ({error}) '
+            f'--scheduler {scheduler!s:.80}: no Dask scheduler answers there ({error}) '
             f'(allowed: the address that dask scheduler prints, such as tcp://127.0.0.1:8786)'
         ) from None
 
@@ -267,10 +275,6 @@ def workers_at_work(
     They fly laws with methods, ``combinations``. What ends their work early is told, with what
     ``advice`` adds, and is the exit code.
     """
-    if workers and scheduler:
-        raise ConfigurationError(
-            f'--workers {workers}: not with --scheduler, whose cluster has workers of its own'
-        )
     try:
         with (
             worker_pool(workers, scheduler, combinations, compiling) as pool,

@@ -115,9 +115,7 @@ class Flight:
         seed: int | None = None,
         duration: float | str | None = None,
     ) -> None:
-        self.scenario = chosen_scenario(
-            scenario, set or {}, controller, law, guidance, seed, duration
-        )
+        self.scenario = chosen_scenario(scenario, set, controller, law, guidance, seed, duration)
         refuse_message_faults(self.scenario)
         refuse_planned_route(self.scenario)
         self._log = np.empty((_LOOK_TICKS, ROW))
@@ -215,7 +213,7 @@ class Flight:
             raise ConfigurationError(f'event = {shown(event)}: unknown (allowed: {allowed})')
         if not isinstance(t_s, Real) or not t_s > -math.inf:
             raise ConfigurationError(f't_s = {shown(t_s)}: not usable (allowed: seconds, or inf)')
-        return self._fly(round(t_s / TICK_S) if math.isfinite(t_s) else math.inf, event)
+        return self._fly(round(min(t_s, 1e9) / TICK_S), event)  # no flight is so long
 
     def order(self, **asked: Any) -> Order:
         """Tell the vehicle something, from the next tick on.

@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from glider_base.errors import shown
 from glider_base.ros.places import given_domain
-from glider_base.settings import ConfigurationError
+from glider_base.settings import ConfigurationError, path_of
 from glider_bringup.engines.compiling import told
 from glider_bringup.engines.flight import Progress, Taker
 from glider_bringup.engines.flight import fly as fly_direct
@@ -26,6 +25,7 @@ from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.scoring.traces import make_tracer
 from glider_control.law import LawSettings
 from glider_control.own_law import own_law
+from glider_mission.changes import given_fields
 from glider_mission.choices import ENGINES, chosen_fields, combination_of
 from glider_mission.disk import write_whole
 from glider_mission.planned import planned_ticks
@@ -121,7 +121,7 @@ class Run:
         from glider_bringup.showing.report import report_page
 
         folder = self.folder if self.folder and self.folder.is_dir() else None
-        file = Path(path) if path is not None else (folder or Path()) / REPORT_FILE
+        file = path_of('path', path) if path is not None else (folder or Path()) / REPORT_FILE
         if self.folder:
             flown = read_run(self.folder)
         else:
@@ -135,7 +135,7 @@ class Run:
 
 def chosen_scenario(
     scenario: str | Path | Scenario,
-    fields: Mapping[str, Any],
+    fields: Mapping[str, Any] | None,
     controller: str | None,
     law: type[LawSettings] | Callable | None,
     guidance: str | None,
@@ -143,19 +143,15 @@ def chosen_scenario(
     duration: float | str | None,
 ) -> Scenario:
     """The scenario that the arguments of `fly` ask for."""
-    if not isinstance(fields, Mapping):
-        raise ConfigurationError(
-            f'set = {shown(fields)}: not usable (allowed: values by dotted field name)'
-        )
     if law is not None and controller is not None:
         raise ConfigurationError(f'--controller {controller}: not with a law of your own')
     own = own_law(law) if law is not None else None
     with _CHOOSING:
         if own:
             controller = know_law(own)
-        fields = chosen_fields(fields, controller, guidance, seed, duration)
+        fields = chosen_fields(given_fields(fields), controller, guidance, seed, duration)
         if not isinstance(scenario, Scenario):
-            return load_scenario(str(scenario), fields)
+            return load_scenario(scenario, fields)
         return changed_scenario(scenario, fields, own) if fields else scenario
 
 
@@ -211,7 +207,9 @@ def fly(
     from glider_bringup.console import progress as bar
 
     if engine not in ENGINES:
-        raise ConfigurationError(f'--engine {engine}: unknown (allowed: {", ".join(ENGINES)})')
+        raise ConfigurationError(
+            f'--engine {engine!s:.80}: unknown (allowed: {", ".join(ENGINES)})'
+        )
     if bag and out is None:
         raise ConfigurationError('--bag: a bag needs a run folder (allowed: with --out)')
     if law is not None and engine != 'direct':
@@ -220,8 +218,9 @@ def fly(
         )
     if engine == 'nodes':
         given_domain()
-    flown = chosen_scenario(scenario, set or {}, controller, law, guidance, seed, duration)
+    flown = chosen_scenario(scenario, set, controller, law, guidance, seed, duration)
     kept = out is not None
+    out = path_of('out', out) if kept else None
     rows, tracer = Rows(), make_tracer(flown)
     in_bag = kept and (bag or engine == 'nodes')
     takers = [*([] if in_bag else [rows]), *([tracer] if kept else [])]
@@ -238,12 +237,12 @@ def fly(
 
 
 @contextmanager
-def _run_folder(scenario: Scenario, out: str | Path | None, engine: str) -> Iterator[Path | None]:
+def _run_folder(scenario: Scenario, out: Path | None, engine: str) -> Iterator[Path | None]:
     """Folder of a run: a new one, one that nodes need for as long as they fly, or none."""
     with ExitStack() as stack:
         if out is None and engine == 'nodes':
             out = Path(stack.enter_context(TemporaryDirectory())) / 'run'
-        yield stack.enter_context(run_folder(scenario, Path(out))) if out is not None else None
+        yield stack.enter_context(run_folder(scenario, out)) if out is not None else None
 
 
 def fly_by(
@@ -299,7 +298,7 @@ def open_run(path: str | Path) -> Run:
     """
     from glider_bringup.showing.flown_run import read_run
 
-    path = Path(path)
+    path = path_of('path', path)
     card = read_run(path, traced=False).card
     with ExitStack() as stack:
         attachments = Bag(path).attachments if has_bag(path) else {}

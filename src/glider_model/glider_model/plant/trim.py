@@ -83,7 +83,8 @@ def solve_trim(
     for name, number, unit, limit in checks:
         if not isinstance(number, Real) or not abs(number) <= limit * (1.0 + 1e-12):
             raise ConfigurationError(
-                f'{name} = {number} {unit}: out of range (allowed: -{limit:g} to {limit:g} {unit})'
+                f'{name} = {number!s:.80} {unit}: out of range '
+                f'(allowed: -{limit:g} to {limit:g} {unit})'
             )
     if net_heaviness_kg == 0.0:
         raise ConfigurationError('net buoyancy = 0 kg: a neutral vehicle does not glide')

@@ -21,6 +21,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
+from glider_base.errors import shown
 from glider_base.files import is_file, read_text, read_yaml, yaml_line, yaml_text
 from glider_base.kernel import source_digest
 from glider_base.settings import ConfigurationError, Settings, file_names, find_file, validate
@@ -63,13 +64,19 @@ class ValuesDimension(_FieldDimension):
     """Values one by one."""
 
     kind: Literal['values']
-    values: list[pydantic.StrictBool | pydantic.StrictInt | float | str] = Field(
+    values: list[Any] = Field(
         min_length=1, max_length=MAX_VALUES, description='values in their order'
     )
 
     @pydantic.field_validator('values')
     @classmethod
     def _alike(cls, values: list[Value]) -> list[Value]:
+        for value in values:
+            is_finite = not isinstance(value, float) or math.isfinite(value)
+            if not (isinstance(value, Value) and is_finite):
+                raise ValueError(
+                    f'{shown(value)}: not usable (allowed: numbers, texts, true, false)'
+                )
         names = {bool: 'true or false', str: 'text'}
         kinds = {names.get(type(value), 'numbers') for value in values}
         if len(kinds) > 1:
@@ -225,8 +232,8 @@ class Plan:
         self, path: Path, changes: dict[str, Any] | None = None, values: dict | None = None
     ) -> None:
         self.path = path
-        self.text = read_text(path) if values is None else yaml_text(values)
         self.sweep = _validate(path, values)
+        self.text = read_text(path) if values is None else yaml_text(values)
         self.given = dict(changes or {})
         #: scenario fields of every cell
         self.common = {
@@ -380,6 +387,6 @@ def read_sweep(name: str) -> Sweep:
     return _validate(find_file('sweep', name, SWEEP_FOLDER))
 
 
-def load_sweep(name: str, changes: dict[str, Any] | None = None) -> Plan:
+def load_sweep(name: str | Path, changes: dict[str, Any] | None = None) -> Plan:
     """Plan of a sweep given by name or by path, with some fields changed; see `Plan`."""
     return Plan(find_file('sweep', name, SWEEP_FOLDER), changes)
