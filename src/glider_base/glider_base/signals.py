@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What travels between the blocks: plain numbers in NED / FRD, SI units and radians."""
 
+from traceback import extract_tb
 from typing import NamedTuple
 
 from glider_base.kernel import kernel
@@ -176,8 +177,8 @@ class Battery(NamedTuple):
     percentage: float  #: what is left, as a share (-)
 
 
-#: Stands in the reason of every run whose numbers ceased to be finite.
-NOT_FINITE = 'not finite at tick'
+#: Stands in the reason of every run that fails: a number ceases to be finite, or a law raises.
+AT_TICK = 'at tick'
 
 
 @kernel
@@ -188,4 +189,16 @@ def dive_m(depth_m):
 
 def not_finite(what: str, tick: int) -> str:
     """Say that something is not finite at a tick."""
-    return f'{what} is {NOT_FINITE} {tick} (t = {tick * TICK_S:.1f} s)'
+    return at_tick(f'{what} is not finite', tick)
+
+
+def raised(error: Exception) -> str:
+    """Say what was raised, by which function in which line."""
+    place = extract_tb(error.__traceback__)[-1]
+    where = f'{place.name} ({place.filename}, line {place.lineno})'
+    return f'{where}: {type(error).__name__}: {error}'
+
+
+def at_tick(what: str, tick: int) -> str:
+    """Say that something happened at a tick."""
+    return f'{what} {AT_TICK} {tick} (t = {tick * TICK_S:.1f} s)'

@@ -20,11 +20,12 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+from numba import typeof
 from numba.core import types
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.extending import is_jitted, overload
 
-from glider_base.errors import ConfigurationError
+from glider_base.errors import ConfigurationError, shown
 from glider_base.kernel import kernel
 from glider_base.kernels.cache import BODIES, Body
 
@@ -101,6 +102,18 @@ def returns(*what: str) -> Callable:
     return mark
 
 
+def usable(values: Any, what: str) -> Any:
+    """State or params as they are; a ConfigurationError if kernels cannot take them."""
+    try:
+        typeof(values)
+    except ValueError:
+        raise ConfigurationError(
+            f'{what}: {shown(values)}: not usable (allowed: a NamedTuple of numbers, arrays and '
+            'such NamedTuples)'
+        ) from None
+    return values
+
+
 def checked(kernel: Callable, *what: str) -> Callable:
     """Call a kernel, which is refused as it is compiled if it returns less or more."""
 
@@ -132,9 +145,12 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
         else:
             usable = types.Number, types.Boolean, types.BaseTuple, types.Array
             odd = (i for i, kind in enumerate(returned) if not isinstance(kind, usable))
-            if (i := next(odd, None)) is None:
+            if (i := next(odd, None)) is not None:
+                why = f'returns {returned[i]} as {what[i]}'
+            elif 'state' in what[0] and not kernel.typingctx.unify_types(kinds[0], returned[0]):
+                why = f'returns {returned[0]} as {what[0]}, which was {kinds[0]}'
+            else:
                 return
-            why = f'returns {returned[i]} as {what[i]}'
     except NOT_COMPILED as error:
         why = f'cannot be compiled: {reason(error)}'
     code = kernel.py_func.__code__

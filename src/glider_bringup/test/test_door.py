@@ -703,7 +703,16 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
             {},
             ['level_step (<ipython-input-1>', 'returns nothing', 'returns 3', 'state after'],
         ),
-        (run_cell(CELL.replace('count + 1', 'count + 0.5')), {}, ['law LevelLaw', 'Turns', '0.0']),
+        (
+            run_cell(CELL.replace('count + 1', 'count + 0.5')),
+            {},
+            ['level_step (<ipython-input-1>', 'returns Turns', 'which was Turns', '0.0'],
+        ),
+        (
+            run_cell(CELL.replace('return Turns(0)', "return {'count': 0}")),
+            {},
+            ["control.law: initial_state: {'count': 0}: not usable", 'NamedTuple of numbers'],
+        ),
         (run_cell(CELL.replace('def initial', 'def first')), {}, ['LevelLaw', 'no initial_state']),
         (run_cell(CELL.partition('@law')[0]), {}, ['law_step: no body for params of type Level']),
         (run_cell(CELL + LEARNT), {}, ['learnt (<ipython-input-1>', 'returns 2', 'roll_bias_nm']),

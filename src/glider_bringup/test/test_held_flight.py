@@ -7,6 +7,7 @@ import math
 import pickle
 import subprocess
 import sys
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,11 @@ import pytest
 
 import glider_bringup as glider
 from glider_base.kernel import kernel
+from glider_base.ros.lockstep.block_node import BlockNode
+from glider_base.ros.lockstep.process import Stop
+from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.engines.direct import FlightError
+from glider_bringup.engines.flight import ended
 from glider_control.law import LawSettings, law_step
 from glider_guard.rows import LATCHED
 from glider_guidance.settings import GuidanceSettings
@@ -209,9 +214,12 @@ def failing_step(state, seen, params, dt):
     return Called(state.times + 1), -20.0 * seen.measured.phi_dot, pitch
 
 
+RAISED = r'failing_step \(.*test_held_flight.py, line \d+\): ValueError: none of yours at tick'
+
+
 @pytest.mark.parametrize('raises', [False, True])
 def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up(raises):
-    told = 'ValueError: none of yours at tick' if raises else 'wrench is not finite at tick'
+    told = RAISED if raises else 'wrench is not finite at tick'
     fields = {'profile.depth_m': 15.0, 'control.FailingLaw.raises': raises}
     flight = glider.Flight('current_8deg', fields, law=FailingLaw)
     surfaced = flight.until('surfacing')
@@ -242,6 +250,22 @@ def test_a_law_that_raises_on_a_planned_route_ends_it_at_that_tick():
     fields = {**failing, 'orders': [], 'guidance.route': 'planned'}
     score = glider.fly('eddies_10d', fields, law=FailingLaw, duration=3600.0).score
     assert f' at tick {score["ticks"]} ' in score['reason'] and score['ticks'] % LOOK_TICKS
+
+
+def test_a_law_that_raises_ends_its_node_by_the_same_words():
+    class Aiming(NamedTuple):
+        theta: float = 0.0
+        theta_dot: float = 0.0
+
+    def tick(*_):
+        seen = SimpleNamespace(reference=Aiming(), measured=Aiming())
+        return failing_step.py_func(Called(3), seen, Failing(3, True), TICK_S)
+
+    block = SimpleNamespace(tick=tick)
+    node = SimpleNamespace(orders={}, absent=(), passed=1, block=block, state=None, params=None)
+    with pytest.raises(Stop, match=rf'{RAISED} 3 \(t = 0.3 s\)') as stop:
+        BlockNode.step(node, 3 * TICK_NS)
+    assert (stop.value.code, ended(False, str(stop.value))) == (1, 'failed')
 
 
 @pytest.mark.parametrize(

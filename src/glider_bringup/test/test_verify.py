@@ -3,6 +3,7 @@
 """What is recorded is what the code does; every bit that is not is named."""
 
 import json
+import re
 import shutil
 import struct
 import subprocess
@@ -24,6 +25,7 @@ from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
 from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.told import read_told
 from glider_mission.recording.ros.verify.check import IDENTICAL
@@ -281,6 +283,21 @@ def test_input_that_is_not_finite_ends_what_can_be_computed(
         assert 'not finite' in blocks[reader]['first']['recorded']
         (note,) = blocks[reader]['notes']
         assert f'{name} differs at t = 30.0 s from what {source} computes' in note
+
+
+def test_block_that_raises_is_told_and_the_others_are_compared(short_run, tmp_path, monkeypatch):
+    run = RecordedBlock.run
+
+    def raises(block, *inputs):
+        if block.block.wired.name == 'control':
+            raise ValueError('none of yours')
+        return run(block, *inputs)
+
+    monkeypatch.setattr(RecordedBlock, 'run', raises)
+    blocks = results(short_run, tmp_path)
+    assert different(blocks) == {'control'}
+    (note,) = blocks['control']['notes']
+    assert re.fullmatch(r'not computed: raises \(.*, line \d+\): ValueError: none of yours', note)
 
 
 @pytest.mark.parametrize('compression', list(CompressionType))

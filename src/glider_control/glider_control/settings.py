@@ -11,6 +11,7 @@ from pydantic import Field
 from glider_base import plugins
 from glider_base.settings import ConfigurationError, Settings, number, positive
 from glider_base.signals import Joints
+from glider_base.slot import usable
 from glider_control import laws, surfaces
 from glider_control.allocation import make_allocation
 from glider_control.control import ControlParams, ControlState
@@ -127,7 +128,7 @@ class ControlSettings(ControlLawSettings):
         return ControlParams(
             allocation=make_allocation(kernel_vehicle),
             polar=make_polar(kernel_vehicle),
-            law=self.chosen.params(vehicle, bank),
+            law=usable(self.chosen.params(vehicle, bank), 'control.law: params'),
             steering=surface.params(vehicle) if surface else NoSteering(),
             buoyancy_ki=self.buoyancy.ki_kg_per_m,
             drag_ki=self.buoyancy.drag_ki_kg_per_m,
@@ -149,7 +150,7 @@ class ControlSettings(ControlLawSettings):
         return ControlState(
             tick=0,
             measured=STILL,
-            law=self.chosen.initial_state(),
+            law=usable(self.chosen.initial_state(), 'control.law: initial_state'),
             steering=surface.initial_state() if surface else NoSteering(),
         )
 

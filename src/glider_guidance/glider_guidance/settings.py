@@ -11,6 +11,7 @@ from pydantic import Field
 
 from glider_base import plugins
 from glider_base.settings import TUNABLE, ConfigurationError, Settings, number, positive
+from glider_base.slot import usable
 from glider_guidance import methods
 from glider_guidance.current_observer import ObserverParams
 from glider_guidance.guidance import Followed, GuidanceParams, GuidanceState
@@ -244,7 +245,7 @@ class GuidanceSettings(GuidanceLawSettings):
             profile=profile,
             polar=polar,
             profile_speed=glide_horizontal_speed(profile.pitch, profile.glide_rate, polar),
-            method=self.chosen.params(self.los, vehicle),
+            method=usable(self.chosen.params(self.los, vehicle), 'guidance.los.method: params'),
             end_s=self.duration_s if self.duration_s > 0.0 else math.inf,
             ends_with_path=self.path.at_end == 'stop',
             no_progress_surfacings=self.no_progress_surfacings,
@@ -261,4 +262,6 @@ class GuidanceSettings(GuidanceLawSettings):
     def initial_state(self) -> GuidanceState:
         """State before the first tick."""
         followed = Followed(STILL, self.steering.initial_state())
-        return GuidanceState(self.chosen.initial_state(), followed)
+        return GuidanceState(
+            usable(self.chosen.initial_state(), 'guidance.los.method: initial_state'), followed
+        )

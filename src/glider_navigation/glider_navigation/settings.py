@@ -10,6 +10,7 @@ from pydantic import Field
 from glider_base import plugins
 from glider_base.frames import Origin, OriginSettings
 from glider_base.settings import Settings, derived, number
+from glider_base.slot import usable
 from glider_base.wiring import BELIEFS, SENSORS
 from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.actuators import ranges
@@ -129,11 +130,18 @@ class NavigationSettings(NavigationLawSettings):
             'imu' in self.chosen.reads,
             'measured_odom' in self.chosen.reads,
         )
-        return NavigationParams(self.origin.params(), intake, self.chosen.params(self._start))
+        return NavigationParams(
+            self.origin.params(),
+            intake,
+            usable(self.chosen.params(self._start), 'navigation.method: params'),
+        )
 
     def initial_state(self) -> 'NavigationState':
         """State before the first tick."""
-        return NavigationState(IntakeState(), self.chosen.initial_state(self._start))
+        return NavigationState(
+            IntakeState(),
+            usable(self.chosen.initial_state(self._start), 'navigation.method: initial_state'),
+        )
 
 
 class NavigationParams(NamedTuple):

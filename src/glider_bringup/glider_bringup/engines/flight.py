@@ -12,7 +12,7 @@ import numpy as np
 from numba import typeof
 
 from glider_base.settings import ConfigurationError
-from glider_base.signals import NOT_FINITE, TICK_S, Battery
+from glider_base.signals import AT_TICK, TICK_S, Battery, at_tick, raised
 from glider_base.wiring import WHEN_SILENT
 from glider_bringup.engines.direct import (
     FlightError,
@@ -216,10 +216,7 @@ class Held:
         except Exception as error:
             if len(log) > 1:
                 return self._until_raised(log[: len(log) // 2])
-            what = f'{type(error).__name__}: {error}'
-            raise FlightError(
-                f'{what} at tick {self.past.tick} (t = {self.past.tick * TICK_S:.1f} s)'
-            ) from error
+            raise FlightError(at_tick(raised(error), self.past.tick)) from error
 
     def _look(self, row: np.ndarray) -> None:
         """Note what guidance and battery told at the last tick, and what it orders itself."""
@@ -265,7 +262,7 @@ def ended(complete: bool, reason: str) -> str:
     """Status of a flight that was complete, or ended early for a reason."""
     if complete:
         return 'completed'
-    return 'failed' if NOT_FINITE in reason or VANISHED in reason else 'aborted'
+    return 'failed' if AT_TICK in reason or VANISHED in reason else 'aborted'
 
 
 def refuse_message_faults(scenario: Scenario) -> None:

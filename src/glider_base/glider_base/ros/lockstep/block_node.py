@@ -9,14 +9,16 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from glider_base.block import Block, Said, Telling, optional_topics
+from glider_base.errors import EXIT_FAILED
 from glider_base.kernel import compiling_told
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.node import TickSettings
 from glider_base.ros.lockstep.peers import FAREWELL_S
+from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.parameters import changed_parameters, declare_settings
 from glider_base.settings import Settings
-from glider_base.signals import TICK_NS, TICK_S
+from glider_base.signals import TICK_NS, TICK_S, at_tick, raised
 from glider_base.wiring import at_rest, present
 
 RCLError = rclpy_implementation.RCLError
@@ -149,9 +151,12 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         for place, values in self.absent:
             inputs = (*inputs[:place], values, *inputs[place:])
         for tick in range(stamp_ns // TICK_NS + 1 - self.passed, stamp_ns // TICK_NS + 1):
-            self.state, outputs, flags = self.block.tick(
-                self.state, tick * TICK_S, inputs, self.params, TICK_S
-            )
+            try:
+                self.state, outputs, flags = self.block.tick(
+                    self.state, tick * TICK_S, inputs, self.params, TICK_S
+                )
+            except Exception as error:  # of a law of somebody's own
+                raise Stop(EXIT_FAILED, at_tick(raised(error), tick)) from error
         if self.block.say and self.telling.is_due(flags, stamp_ns):
             self.tell(stamp_ns, flags)
         self.said, self.flags = (stamp_ns, outputs), flags

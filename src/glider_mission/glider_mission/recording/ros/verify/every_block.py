@@ -14,14 +14,14 @@ import numpy as np
 from glider_base import wiring
 from glider_base.block import optional_topics
 from glider_base.ros.lockstep.health import seconds
-from glider_base.signals import TICK_NS
+from glider_base.signals import TICK_NS, raised
 from glider_base.wiring import WHEN_SILENT, WIRING, Wired, present, publisher
 from glider_mission.blocks import BLOCKS
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.told import Told
-from glider_mission.recording.ros.verify.check import IDENTICAL, SKIPPED, Verdict
+from glider_mission.recording.ros.verify.check import DIFFERENT, IDENTICAL, SKIPPED, Verdict
 from glider_mission.recording.ros.verify.free_running import free_running
 from glider_mission.recording.ros.verify.lockstep import in_lockstep
 
@@ -76,7 +76,10 @@ def verify(
             continue
         work = in_lockstep if lockstep else partial(free_running, max_age_s=told.max_age_s)
         recorded = RecordedBlock(block, settings)
-        yield work(recorded, recording, progress=partial(progress, name))
+        try:
+            yield work(recorded, recording, progress=partial(progress, name))
+        except Exception as error:  # of a law of somebody's own
+            yield Verdict(name, DIFFERENT, notes=[f'not computed: {raised(error)}'])
 
 
 def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) -> dict:
