@@ -39,6 +39,7 @@ def _write_bag(
     attachments: bool = True,
     compression: CompressionType = CompressionType.ZSTD,
     chunked: bool = True,
+    rename=lambda topic: topic,
 ) -> None:
     """Write messages with the schemas, channels and attachments of another file."""
     with like.open('rb') as stream, file.open('wb') as out:
@@ -54,7 +55,7 @@ def _write_bag(
             schema = summary.schemas[channel.schema_id]
             number = writer.register_schema(schema.name, schema.encoding, schema.data)
             ids[channel.topic] = writer.register_channel(
-                channel.topic, channel.message_encoding, number, channel.metadata
+                rename(channel.topic), channel.message_encoding, number, channel.metadata
             )
         for attachment in reader.iter_attachments() if attachments else ():
             writer.add_attachment(0, 0, attachment.name, attachment.media_type, attachment.data)

@@ -120,6 +120,14 @@ def test_killed_node_is_named(fly, name, number):
     assert time.monotonic() - started < 30.0, 'it waited for a time-out'
 
 
+def test_nodes_that_are_killed_together_are_all_named(fly):
+    at = time.time() + 1.0
+    die = python(f'import os, time; time.sleep({at} - time.time()); os.kill(os.getpid(), 9)')
+    result, _ = fly({'guidance_node': die, RECORDER: recorder(), PLANT: node(), 'guard_node': die})
+    killed = ('guidance_node', 'guard_node')
+    assert result.reason == '; '.join(f'{name} was killed by SIGKILL' for name in killed)
+
+
 @pytest.mark.parametrize('name', ['guidance_node', PLANT])
 def test_node_that_leaves_early_is_named(fly, name):
     commands = {'guidance_node': node(), RECORDER: recorder(), PLANT: node()}

@@ -24,6 +24,7 @@ from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.scoring.again import score_again
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording
@@ -283,6 +284,66 @@ def test_input_that_is_not_finite_ends_what_can_be_computed(
         assert 'not finite' in blocks[reader]['first']['recorded']
         (note,) = blocks[reader]['notes']
         assert f'{name} differs at t = 30.0 s from what {source} computes' in note
+
+
+def moved(message, offset_ns: int, log_ns: int):
+    """The same message with another time in its header, where it begins with one."""
+    stamp_ns = message.log_ns + offset_ns
+    data = bytearray(message.data)
+    struct.pack_into('<iI', data, 4, *divmod(stamp_ns, 10**9))
+    return message._replace(data=bytes(data), log_ns=log_ns)
+
+
+def test_a_recording_in_which_all_stands_twice_is_told_so(altered, beginning, tmp_path):
+    report = verified(altered([one for one in beginning for _ in range(2)]), tmp_path)
+    assert report['lockstep']
+    for block in report['blocks']:
+        assert block['first']['computed'].endswith('out of place or there twice')
+
+
+def test_stamps_that_rot_in_a_topic_are_no_ticks_of_the_others(altered, beginning, tmp_path):
+    messages = [
+        moved(one, 50 * 10**9, one.log_ns)
+        if one.topic == '/glider/battery' and one.log_ns // TICK_NS in (100, 101)
+        else one
+        for one in beginning
+    ]
+    assert different(results(altered(messages), tmp_path)) == {'plant', 'guard'}
+
+
+@pytest.mark.filterwarnings('error')
+def test_number_that_rots_to_nan_is_a_difference_and_no_warning(altered, beginning, tmp_path):
+    place = [i for i, m in enumerate(beginning) if m.topic == '/glider/battery'][100]
+    data = beginning[place].data
+    voltage = struct.pack('<f', PER_TICK['/glider/battery'].codec.decode(data)[1][0])
+    messages = list(beginning)
+    raw = data.replace(voltage, struct.pack('<I', 0x7F800001), 1)  # one that signals
+    messages[place] = messages[place]._replace(data=raw)
+    first = results(altered(messages), tmp_path)['plant']['first']
+    assert (first['tick'], first['field'], first['recorded']) == (100, 'voltage', 'nan')
+
+
+def test_a_vehicle_whose_clock_is_set_back_is_verified(altered, beginning, tmp_path):
+    """As recorded by the time of arrival."""
+    start_ns, at_ns, hour_ns = 10**13 + 12_345_678, 200 * TICK_NS, 3600 * 10**9
+    messages = [
+        moved(one, start_ns - hour_ns * (one.log_ns >= at_ns), start_ns + one.log_ns)
+        for one in beginning
+    ]
+    report = verified(altered(messages), tmp_path)
+    assert not report['lockstep']
+    for block in report['blocks'][2:5]:
+        assert block['ticks'] == 400
+        assert set(block['differing']) <= {'path', '/diagnostics'}, block
+
+
+@pytest.mark.parametrize('keep', [False, True])
+def test_a_bag_without_events_of_its_nodes_does_not_say_how_it_ended(altered, recorded, keep):
+    messages = [one for one in recorded if keep or one.topic != '/diagnostics']
+    folder = altered(messages, rename=lambda topic: topic.replace('/glider/', '/alpha/'))
+    card = score_again(folder)
+    assert (card['ticks'], card['status']) == (1200, 'aborted')
+    assert card['reason'] == 'nothing on /diagnostics is of /alpha: nobody knows how it ended'
 
 
 def test_block_that_raises_is_told_and_the_others_are_compared(short_run, tmp_path, monkeypatch):

@@ -57,6 +57,8 @@ _HEAR_S = 0.5
 _END_S = 1.0
 #: A failure is seen within this time (s) after nodes left because of it, on a busy machine too.
 _AFTERMATH_S = 3.0
+#: Of processes that are killed at the same moment one hears within this time (s).
+_TOGETHER_S = 0.1
 
 
 class RunnerResult(NamedTuple):
@@ -301,25 +303,25 @@ class _Run:
 
     # ------------------------------------------------------------------ watching
 
-    def watch(self) -> tuple[str, _Process | None]:
-        """Wait for the end. Status, and the process that is to blame for a failure."""
+    def watch(self) -> tuple[str, list[_Process]]:
+        """Wait for the end. Status, and the processes that are to blame for a failure."""
         while True:
             self.pump(0.1)
             if self.signal is not None:
-                return 'aborted', None
+                return 'aborted', []
             ended = [p for p in self.processes.values() if p.code is not None]
             if not ended and self._server.code is None:
                 continue
             self.pump(0.0)
             if self._server.code is not None:
-                return 'failed', self._server
+                return 'failed', [self._server]
             if not self.progress.get('complete'):
-                return 'failed', self._culprit()
+                return 'failed', self._culprits()
             self._wait_for(self.processes.values(), _LEAVE_S)
-            return 'completed', None
+            return 'completed', []
 
-    def _culprit(self) -> _Process:
-        """Of the dead, the one that did not merely notice that another one was ill.
+    def _culprits(self) -> list[_Process]:
+        """Of the dead, the one that did not merely notice that another was ill, and the killed.
 
         Nodes that leave because the plant gave up may be gone before the plant is.
         """
@@ -328,7 +330,8 @@ class _Run:
             ended = [p for p in self.processes.values() if p.code is not None]
             first = min(ended, key=lambda p: (p.code == 0, p.code == 3))
             if first.code != 0 or time.monotonic() > deadline:
-                return first
+                self._wait_for(self.processes.values(), _TOGETHER_S)
+                return [p for p in self.processes.values() if p is first or (p.code or 0) < 0]
             self.pump(0.05)
 
     def _wait_for(self, processes: Collection[_Process], timeout_s: float) -> None:
@@ -401,16 +404,16 @@ def run_nodes(
         with _signals(run):
             try:
                 run.start(commands, node_environment(domain))
-                status, culprit = run.watch()
+                status, culprits = run.watch()
             finally:
                 run.stop()
         now, reason = time.monotonic(), ''
         if status == 'aborted':
             reason = f'stopped by {signal.Signals(run.signal).name}'
-        if culprit is not None:
-            reason = culprit.epitaph()
+        if culprits:
+            reason = '; '.join(one.epitaph() for one in culprits)
         flight_s = now - (run.first_tick_s or now)
-        return RunnerResult(status, reason, culprit.code if culprit else 0, flight_s)
+        return RunnerResult(status, reason, culprits[0].code if culprits else 0, flight_s)
 
 
 @contextmanager

@@ -58,7 +58,7 @@ def score_bag(
         reason = '' if complete else old['reason']
     else:
         complete = bool(log.end) and log.end.phase == FINISHED
-        cut = 'the recording was stopped before the run was complete'
+        cut = log.untold or 'the recording was stopped before the run was complete'
         reason = '' if complete else log.end.message if log.end else cut
     lost = log.lost(complete)
     untold = not (old or log.end) and any(log.recorded().values())

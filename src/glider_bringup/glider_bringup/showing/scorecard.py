@@ -151,7 +151,7 @@ def _travel_rows(card: dict) -> list[tuple[str, str]]:
 #: Parts of a card that are told in words of their own, where the first of their scores stands.
 _IN_WORDS: dict[str, Callable[[dict], list[tuple[str, str]]]] = {
     'messages_recorded': lambda card: [
-        ('messages', f'{card["messages_recorded"]:,} recorded, {card["messages_lost"]} lost')
+        ('messages', f'{card["messages_recorded"]:,} recorded, {card["messages_lost"]:,} lost')
     ],
     'messages_lost': lambda card: [],
     'end_of_path_m': _end_rows,

@@ -233,8 +233,9 @@ class Codec:
         table = np.ascontiguousarray(rows).view(self._rows)[:, 0]
         sec, nanosec = (table[name].astype(np.int64) for name in self._columns[:2])
         values = np.zeros((len(rows), self.width))
-        for i, name in enumerate(self._columns[2:]):
-            values[:, i] = table[name]
+        with np.errstate(invalid='ignore'):  # damaged bytes may be NaN of the kind that signals
+            for i, name in enumerate(self._columns[2:]):
+                values[:, i] = table[name]
         if self._unmeasured:
             said = values[:, : len(self.fields)]
             np.copyto(said, self._unmeasured, where=np.isnan(said))

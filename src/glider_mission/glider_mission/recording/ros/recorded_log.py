@@ -118,6 +118,8 @@ class RecordedLog:
                 'is needed'
             )
         (self._namespace,) = found or '/'
+        #: that no event of these nodes is there, in words
+        self.untold = f'nothing on /diagnostics is of {self._namespace}: nobody knows how it ended'
         known = known_topics(self._namespace)
         #: Our names of what is recorded, and those of others, by index.
         self._topics = [getattr(known.get(one.name), 'name', one.name) for one in bag.topics]
@@ -164,6 +166,7 @@ class RecordedLog:
                 continue
             if not health.concerns(array, self._namespace):
                 continue
+            self.untold = ''
             self.end = self.end or health.end_of_run(array)
             tick = health.stamp_of(array) // TICK_NS
             for status in array.status:

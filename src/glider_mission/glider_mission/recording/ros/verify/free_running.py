@@ -63,7 +63,8 @@ def free_running(
     while start < len(stamps_ns):
         choices = {}
         for name in block.inputs:
-            behind = int(np.searchsorted(series[name].stamps_ns, stamps_ns[start], 'right'))
+            newest_ns = np.maximum.accumulate(series[name].stamps_ns)  # a clock may be set back
+            behind = int(np.searchsorted(newest_ns, stamps_ns[start], 'right'))
             choices[name] = _places(behind - 1, last and last[name])
         check.follow_orders(start)
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])

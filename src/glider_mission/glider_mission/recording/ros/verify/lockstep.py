@@ -56,10 +56,9 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
     """Compare a block tick by tick."""
     series, wired = recording.series, block.block.wired
     most = max(len(one) for one in series.values())
-    ticks = 1 + max(
-        int(placed[placed < 2 * most + 1000].max(initial=0))
-        for placed in (place_ticks(one.stamps_ns) for one in series.values())
-    )
+    placed = (place_ticks(one.stamps_ns) for one in series.values())
+    last = sorted(int(one[one < 2 * most + 1000].max(initial=0)) for one in placed)
+    ticks = 1 + last[-2:][0]  # the stamp of one topic alone may be damaged
     inputs = {name: by_tick(series[name], ticks)[0] for name in block.inputs}
     late = [name for name, track in inputs.items() if track.index[0] < 0]
     if late:
