@@ -46,6 +46,18 @@ def test_next_surfacing_and_arrival_come_when_they_are_foretold():
     assert flight.status.leg == 2 and abs(flight.status.to_go_m) < 30.0
 
 
+@pytest.mark.parametrize('sets_deg', [0.0, 180.0])
+def test_arrival_comes_when_it_is_foretold_though_the_current_acts_on_at_the_surface(sets_deg):
+    path = {'kind': 'straight', 'length_m': 3000.0, 'at_end': 'stop'}
+    stays = {'profile.surface_every_dives': 1, 'profile.wait_s': 600.0, 'path': path}
+    current = {'current.speed_mps': 0.1, 'current.direction_deg': sets_deg}
+    flight = glider.Flight('current_8deg', {**DIVES, **STILL, **stays, **current}, duration=60000)
+    flight.until(t_s=3000.0)  # by then it knows the current
+    told = flight.status
+    assert flight.until('arrival').name == 'arrival'
+    assert told.eta_s == pytest.approx(flight.t_s - told.t_s, rel=0.08)
+
+
 def test_energy_that_is_left_is_what_the_ledger_has_not_spent():
     flight = glider.Flight('current_8deg', {**DIVES, **STILL, 'path': LEGS})
     assert flight.status.energy_left_wh == float('inf')  # nothing was heard yet

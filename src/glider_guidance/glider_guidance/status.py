@@ -39,19 +39,21 @@ def status_of(state: GuidanceState, params: GuidanceParams, battery: Battery) ->
     share = (s - path.knots[piece]) / (path.knots[piece + 1] - path.knots[piece])
     way_m = path.ways[piece] + share * (path.ways[piece + 1] - path.ways[piece])
     current = state.water.observer
-    glide_s = way_left(
-        *(s, place.error.e1, params.profile_speed, current.current_n, current.current_e),
-        *(math.inf, path),
-    ).glide_s
     stay_s = TICK_S * (profile.wait_ticks + profile.prepare_ticks)
-    turns_s = 2.0 * profile.lead_s + stay_s / (profile.surface_every or math.inf)
+    dive_s, turns_s = _dive_s(profile), 2.0 * profile.lead_s
+    share = (dive_s - turns_s) / (dive_s + stay_s / (profile.surface_every or math.inf))
+    # in turns and stays the current acts on
+    left = way_left(
+        *(s, place.error.e1, share * params.profile_speed),
+        *(current.current_n, current.current_e, math.inf, path),
+    )
     return Status(
         t_s=state.tick * TICK_S,
         stage=STAGE_NAMES[state.profile.stage],
         leg=piece + 1,
         legs=len(path.knots) - 1,
         to_go_m=float(path.ways[-1] - way_m) - place.error.e1,
-        eta_s=float(glide_s) * (1.0 + turns_s / (_dive_s(profile) - 2.0 * profile.lead_s)),
+        eta_s=float(left.glide_s),
         speed_mps=math.hypot(place.ground_n, place.ground_e),
         current_north_mps=current.current_n,
         current_east_mps=current.current_e,
