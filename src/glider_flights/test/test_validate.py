@@ -374,6 +374,8 @@ def test_what_cannot_be_flown_is_told(file, dive, tmp_path):
     wrong = tmp_path / 'wrong.npy'
     np.save(wrong, np.zeros(5))
     assert 'has shape (5,)' in told(file, *slocum, '--adcp', str(wrong))
+    np.save(wrong, np.full((2, 9), 32.0))  # they are in cm/s
+    assert '(allowed: m/s, > 0, < 5)' in told(file, *slocum, '--adcp', str(wrong))
     np.save(wrong, [['a', 'b'], ['c', 'd']])
     assert 'wrong.npy: cannot be read: could not' in told(file, *slocum, '--adcp', str(wrong))
     wrong.write_bytes(b'')

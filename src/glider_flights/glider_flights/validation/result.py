@@ -203,6 +203,10 @@ def find_adcp(place: Path, file: Path | None) -> Adcp | None:
     time_s, speed = table
     good = np.isfinite(time_s)
     speed = np.where((speed > 0.0) & (speed < FASTEST_MPS), speed, math.nan)
+    if np.isnan(speed).all():
+        raise ConfigurationError(
+            f'--adcp {file}: no speed of a glider (allowed: m/s, > 0, < {FASTEST_MPS:g})'
+        )
     return Adcp(time_s[good], speed[good])
 
 
