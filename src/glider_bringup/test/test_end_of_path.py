@@ -123,6 +123,17 @@ def test_the_last_of_its_dives_may_end_its_path_and_another_path_gives_it_no_mor
     assert ordered['sim_time_s'] == arrived['sim_time_s']
 
 
+def test_it_arrives_though_it_is_carried_back_in_each_stay_at_the_surface():
+    """Two dives that shared the way left made as much as the stay between them lost, for ever."""
+    path = {'kind': 'straight', 'course_deg': 10.0, 'length_m': 700.0, 'at_end': 'stop'}
+    changes = {'vehicle': 'seawing', 'dives': 0, 'path': path, 'duration_s': 20000.0}
+    changes |= {'profile.depth_m': 100.0, 'profile.pitch_deg': 37.1, 'profile.wait_s': 600.0}
+    changes |= {'profile.net_heaviness_kg': 0.386, 'profile.surface_every_dives': 1}
+    changes |= {'current.speed_kn': 0.25, 'current.direction_deg': 147.0}
+    arrival = glider.fly('current_8deg', changes).score['arrival']
+    assert arrival['arrived'] and arrival['missed_m'] < 50.0
+
+
 @pytest.mark.parametrize(
     ('begins_m', 'depth_m'), [(8.0, 20.0), (40.0, 50.0), (199.0, 200.0), (300.0, 200.0)]
 )

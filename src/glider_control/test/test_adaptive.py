@@ -81,6 +81,19 @@ def test_nothing_is_learnt_while_the_vehicle_turns_over(change):
     assert state.steering.climb == SETTINGS.initial_state().steering.climb
 
 
+def test_a_dive_from_the_surface_teaches_no_sooner_than_one_after_an_inflection():
+    """There the law is not asked: the first that it sees of a fast dive is a fast dive."""
+    state, known = SETTINGS.initial_state(), SETTINGS.initial_state().steering.dive
+    for _ in range(600):
+        state, *_ = step(state, measured(theta=0.5, vertical_rate=-0.27), reference(v_d=-0.27))
+    for _ in range(290):
+        state, *_ = step(state, measured(phi=-0.3, psi_dot=0.02), reference())
+        assert state.steering.dive == known
+    for _ in range(20):
+        state, *_ = step(state, measured(phi=-0.3, psi_dot=-0.006), reference())
+    assert state.steering.dive != known
+
+
 def test_nose_low_makes_a_nose_up_moment_and_the_other_way_round():
     for theta, sign in ((-0.6, 1.0), (-0.4, -1.0)):
         _, _, tau_q = step(SETTINGS.initial_state(), measured(theta=theta), reference())

@@ -113,8 +113,10 @@ def adaptive_step(state, seen, params, dt):
     """Roll and pitch moment (N m): see `law_step`."""
     params = bank_carefully(seen.m_b, params)
     now, wanted = seen.measured, seen.reference
-    steering = learn(state.steering, now, seen.speed, params.steering, dt)
-    down = now.vertical_rate > 0.0
+    down, steering = now.vertical_rate > 0.0, state.steering
+    if down != state.is_down:  # at the surface it was not asked: no glide of before goes on
+        steering = replace(steering, steady_s=0.0)
+    steering = learn(steering, now, seen.speed, params.steering, dt)
     command = 0.0
     if steering.steady_s > 0.0:
         phase = steering.dive if down else steering.climb

@@ -11,6 +11,7 @@ import math
 from typing import NamedTuple
 
 from glider_base.kernel import kernel
+from glider_base.signals import TICK_S
 from glider_guidance.los import crab_heading
 from glider_guidance.path.curve import path_piece, path_tangent
 
@@ -79,12 +80,15 @@ def next_dive(left, depth, surfaced, lead_s, dives, params):
         left_s += top / rate
     turns_s = 2.0 * lead_s * left.drift
     dive_s = 2.0 * (params.depth - top) / rate + turns_s
-    if dive_s <= 0.0:
+    lost_s = 0.0  # by the stay at the surface before the next
+    if params.surface_every > 0 and (dives + 1) % params.surface_every == 0:
+        lost_s = -min(0.0, left.drift) * TICK_S * (params.wait_ticks + params.prepare_ticks)
+    if dive_s <= lost_s:
         return params.depth
-    count = max(1.0, math.ceil(left_s / dive_s))
+    count = max(1.0, math.ceil((left_s - lost_s) / (dive_s - lost_s)))
     if count > SHARED_DIVES or (params.dives > 0 and count > max(1, params.dives - dives)):
         return params.depth
-    made_good_s = left_s / count
+    made_good_s = (left_s + (count - 1.0) * lost_s) / count
     planned = top + 0.5 * rate * (made_good_s - turns_s)
     shallowest = shallowest_dive(params)
     # nor is a dive worth it that mostly makes up for what its turns lose to the current
