@@ -91,8 +91,8 @@ def bench(
 
 def machine() -> dict:
     """What the figures were measured on."""
-    told = Path('/proc/cpuinfo').read_text(encoding='utf-8')
-    model = re.search(r'^model name\s*:\s*(.*)$', told, re.MULTILINE)
+    text = Path('/proc/cpuinfo').read_text(encoding='utf-8')
+    model = re.search(r'^model name\s*:\s*(.*)$', text, re.MULTILINE)
     return {
         'processor': model[1] if model else platform.machine(),
         'processors': len(os.sched_getaffinity(0)),

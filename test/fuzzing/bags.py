@@ -30,9 +30,9 @@ from glider_bringup.showing.flown_run import keep_traces, read_run
 from glider_bringup.showing.report import report_page
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recover import recover
+from glider_mission.recording.ros.node_settings import read_settings
 from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.republish import plan_replay, recorded_messages
-from glider_mission.recording.ros.told import read_told
 from glider_mission.recording.ros.verify.every_block import report, verify
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import Scenario, load_scenario
@@ -151,7 +151,7 @@ def _report(folder: Path) -> Answer:
 def _verify(folder: Path) -> Answer:
     with tempfile.TemporaryDirectory() as scratch:
         bag = Bag(folder)
-        told = read_told(bag, folder, None, Path(scratch))
+        told = read_settings(bag, folder, None, Path(scratch))
         recording = Recording(bag, None, lambda share: None, told.steers_by)
         verdicts = list(verify(recording, told, [], lambda name, share: None))
     found = report(bag, recording, told, verdicts)

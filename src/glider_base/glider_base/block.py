@@ -87,28 +87,28 @@ def _rows_at(arrays, row):
 
 
 @kernel
-def _differs(flags, told):
+def _differs(flags, reported):
     """Whether one of some flags, int64[m], is not as it was told."""
     for i in range(len(flags)):
-        if flags[i] != told[i]:
+        if flags[i] != reported[i]:
             return True
     return False
 
 
 @kernel
-def changes_to_tell(flags, stamps_ns, every_ns, told, told_ns):
+def changes_to_tell(flags, stamps_ns, every_ns, reported, reported_ns):
     """Where flags int64[n, m] have changed, told at most once in ``every_ns``; indices int64[k].
 
-    The flags ``told`` last, int64[m], are changed in place.
+    The flags ``reported`` last, int64[m], are changed in place.
     """
     found = np.empty(len(flags), np.int64)
     count = 0
     for k in range(len(flags)):
-        since_ns = stamps_ns[k] - told_ns  # less than nothing: a vehicle's clock was set back
-        if not 0 <= since_ns < every_ns and _differs(flags[k], told):
-            for i in range(len(told)):  # a slice has numba load its text module
-                told[i] = flags[k, i]
-            told_ns = stamps_ns[k]
+        since_ns = stamps_ns[k] - reported_ns  # less than nothing: a vehicle's clock was set back
+        if not 0 <= since_ns < every_ns and _differs(flags[k], reported):
+            for i in range(len(reported)):  # a slice has numba load its text module
+                reported[i] = flags[k, i]
+            reported_ns = stamps_ns[k]
             found[count] = k
             count += 1
     return found[:count]
@@ -119,20 +119,20 @@ class Telling:
 
     def __init__(self, block: Block, start_ns: int = 0) -> None:
         self.block = block
-        self._told, self._told_ns = tuple(block.quiet), start_ns - block.every_ns
+        self._reported, self._reported_ns = tuple(block.quiet), start_ns - block.every_ns
 
     def among(self, flags: np.ndarray, stamps_ns: np.ndarray) -> np.ndarray:
         """Indices of the ticks at which something is told; flags int64[n, m], stamps int64[n]."""
         every_ns = self.block.every_ns
-        told = np.array(self._told, np.int64)
-        found = changes_to_tell(flags, stamps_ns, every_ns, told, self._told_ns)
+        reported = np.array(self._reported, np.int64)
+        found = changes_to_tell(flags, stamps_ns, every_ns, reported, self._reported_ns)
         if len(found):
-            self._told, self._told_ns = tuple(told.tolist()), int(stamps_ns[found[-1]])
+            self._reported, self._reported_ns = tuple(reported.tolist()), int(stamps_ns[found[-1]])
         return found
 
     def is_due(self, flags: tuple[int, ...], stamp_ns: int) -> bool:
         """Whether flags of one tick are told."""
-        if flags == self._told or 0 <= stamp_ns - self._told_ns < self.block.every_ns:
+        if flags == self._reported or 0 <= stamp_ns - self._reported_ns < self.block.every_ns:
             return False
-        self._told, self._told_ns = flags, stamp_ns
+        self._reported, self._reported_ns = flags, stamp_ns
         return True

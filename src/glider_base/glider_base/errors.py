@@ -21,7 +21,7 @@ MAX_LINE = 900
 #: Characters of a value in an error.
 MAX_SHOWN = 80
 #: So many of the fields that were changed are told with what is wrong.
-CHANGES_TOLD = 4
+CHANGES_SHOWN = 4
 
 #: The machine or the result is to blame: a full disk, a failed flight, a vehicle that is lost,
 #: something that differs.
@@ -104,11 +104,11 @@ def clipped(text: str) -> str:
     return text if len(text) <= MAX_SHOWN else f'{text[: MAX_SHOWN - 1]}…'
 
 
-def told_changes(changes: dict[str, Any]) -> str:
+def changes_text(changes: dict[str, Any]) -> str:
     """The first fields that were changed since a file was read, in words."""
-    told = [f'{clipped(field)}={shown(value)}' for field, value in changes.items()]
-    more = [f'{len(told) - CHANGES_TOLD} more'] if len(told) > CHANGES_TOLD else []
-    return ' with ' + ', '.join(told[:CHANGES_TOLD] + more) if told else ''
+    fields = [f'{clipped(field)}={shown(value)}' for field, value in changes.items()]
+    more = [f'{len(fields) - CHANGES_SHOWN} more'] if len(fields) > CHANGES_SHOWN else []
+    return ' with ' + ', '.join(fields[:CHANGES_SHOWN] + more) if fields else ''
 
 
 @contextmanager

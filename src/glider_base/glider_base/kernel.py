@@ -91,7 +91,7 @@ def replace(values: Values, **changes) -> Values:
 
     Examples
     --------
-    >>> replace(state, tick=0, told=state.told | ORDERED)
+    >>> replace(state, tick=0, reported=state.reported | ORDERED)
     """
     return values._replace(**changes)
 
@@ -116,12 +116,12 @@ class _Compiling(event.Listener):
     """Tells when numba begins to compile, and ends what was told when it has."""
 
     def __init__(self, tell: Tell) -> None:
-        self._tell, self._depth, self._is_told = tell, 0, False
+        self._tell, self._depth, self._is_shown = tell, 0, False
         self._end: Callable[[], None] | None = None
 
     def on_start(self, event) -> None:
-        if not self._depth and (self._end or not self._is_told):
-            self._end, self._is_told = self._tell(), True
+        if not self._depth and (self._end or not self._is_shown):
+            self._end, self._is_shown = self._tell(), True
         self._depth += 1
 
     def on_end(self, event) -> None:
@@ -131,7 +131,7 @@ class _Compiling(event.Listener):
 
 
 @contextmanager
-def compiling_told(tell: Tell) -> Iterator[None]:
+def on_compiling(tell: Tell) -> Iterator[None]:
     """Call ``tell`` if something in the block has to be compiled, before it is.
 
     What is found in the cache is not compiled. If ``tell`` returns a function, this is called when

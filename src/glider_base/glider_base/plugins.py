@@ -135,10 +135,10 @@ def of_others(found: dict[str, ClassT], package: ModuleType) -> set[str]:
 
 def _tell(point: EntryPoint, why: str) -> None:
     """Say on standard error that something cannot be used, unless a parent process has said it."""
-    told = os.environ.get(TOLD, '').split(os.pathsep)
+    known = os.environ.get(TOLD, '').split(os.pathsep)
     name = f'{point.group}.{point.name}'
-    if name not in told:
-        os.environ[TOLD] = os.pathsep.join([*filter(None, told), name])
+    if name not in known:
+        os.environ[TOLD] = os.pathsep.join([*filter(None, known), name])
         print(ConfigurationError(f'glider: {_origin(point)}: not usable: {why}'), file=sys.stderr)
 
 

@@ -150,8 +150,8 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
             extra = field.json_schema_extra if field is not None else None
             return f'allowed: {context[key]}' + _others(extra)
     found = (field is not None and limits(field)) or context
-    told = [f'{word} {found[key]}' for key, word in BOUNDS.items() if key in found]
-    return f'allowed: {" and ".join(told)}' if told else ''
+    bounds = [f'{word} {found[key]}' for key, word in BOUNDS.items() if key in found]
+    return f'allowed: {" and ".join(bounds)}' if bounds else ''
 
 
 def limits(field: pydantic.fields.FieldInfo) -> dict[str, float]:
@@ -231,10 +231,10 @@ Mistake = tuple[tuple[str, ...], str]
 def mistakes(error: pydantic.ValidationError, model: type[pydantic.BaseModel]) -> list[Mistake]:
     """Mistakes that an error is about: the first of them, and how many more there are."""
     found = error.errors(include_url=False)
-    told = [_mistake(item, model) for item in found[:MAX_LINES]]
+    listed = [_mistake(item, model) for item in found[:MAX_LINES]]
     if len(found) > MAX_LINES:
-        told[-1:] = [((), f'and {len(found) - MAX_LINES + 1} more')]
-    return told
+        listed[-1:] = [((), f'and {len(found) - MAX_LINES + 1} more')]
+    return listed
 
 
 def _mistake(item: dict, model: type[pydantic.BaseModel]) -> Mistake:
@@ -276,13 +276,13 @@ def validate(
     try:
         return model.model_validate(values, context={'folder': folder} if folder else None)
     except pydantic.ValidationError as error:
-        told = []
+        lines = []
         for location, text in mistakes(error, model):
             line = line_of(location)
-            told.append(
+            lines.append(
                 f'{source}:{line}{changed}: {text}' if line else f'{source}{changed}: {text}'
             )
-        raise ConfigurationError('\n'.join(told)) from None
+        raise ConfigurationError('\n'.join(lines)) from None
 
 
 def _flags(values: Any, name: str = '') -> Iterator[tuple[str, bool]]:
@@ -301,8 +301,8 @@ def _refuse_flags_for_numbers(model: type[Settings], values: Any, source: str) -
         field = find_field(model, name)
         kinds = get_args(field.annotation) or (field.annotation,) if field is not None else ()
         if bool not in kinds and (int in kinds or float in kinds):
-            told = str(value).lower()
-            raise ConfigurationError(f'{source}: {name} = {told}: no number (allowed: a number)')
+            flag = str(value).lower()
+            raise ConfigurationError(f'{source}: {name} = {flag}: no number (allowed: a number)')
 
 
 def file_names(folder: Path) -> list[str]:

@@ -12,7 +12,7 @@ import numba
 import pytest
 from numba.core import event, types
 
-from glider_base.kernel import compiling_told
+from glider_base.kernel import on_compiling
 
 
 class Inner(NamedTuple):
@@ -50,10 +50,10 @@ def make_halves():
 def test_compiling_is_told_before_it_begins_once_and_only_then():
     told, seen = [], []
     _, quarter = make_halves()
-    with compiling_told(lambda: told.append(len(quarter.signatures))):
+    with on_compiling(lambda: told.append(len(quarter.signatures))):
         seen.append(quarter(4.0))  # compiles two functions
         seen.append(quarter(4))  # and again for another type
-    with compiling_told(lambda: told.append('again')):
+    with on_compiling(lambda: told.append('again')):
         seen.append(quarter(8.0))
     quarter(1j)
     assert seen == [1.0, 1.0, 2.0]

@@ -234,7 +234,7 @@ def shares():
 
 
 @contextmanager
-def interrupted_told():
+def interrupt_shown():
     """Ctrl-C ends what is done in the block, is told, and is the exit code."""
     try:
         yield

@@ -27,8 +27,8 @@ from glider_guidance.path.curve import path_length, path_tangent
 from glider_guidance.status import status_of
 from glider_mission.blocks import BLOCKS, ROW
 from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.node_settings import read_settings
 from glider_mission.recording.ros.recorded_run import Recording
-from glider_mission.recording.ros.told import read_told
 from glider_mission.recording.ros.verify.every_block import verify
 from glider_mission.rules import Rules
 from glider_mission.run_folder import make_run_folder
@@ -50,12 +50,12 @@ def main() -> None:
 def one_tick(number: int) -> None:
     """One tick of a block, as its node calls it, and every order that it takes."""
     state, params = mission_of(load_scenario())
-    block, own, told = BLOCKS[number], state[number], params[number]
+    block, own, own_params = BLOCKS[number], state[number], params[number]
     inputs = tuple(at_rest(topic) for topic in block.wired.inputs)
     if block.wired is PLANT.wired:
-        plant_outputs(plant_move(own, inputs, told, TICK_S), told)
+        plant_outputs(plant_move(own, inputs, own_params, TICK_S), own_params)
         return
-    moved, _, _ = block.tick(own, 0.0, inputs, told, TICK_S)
+    moved, _, _ = block.tick(own, 0.0, inputs, own_params, TICK_S)
     for order in block.orders:
         order(moved)
 
@@ -97,9 +97,9 @@ def verify_one_tick() -> None:
         folder = make_run_folder(scenario, Path(scratch) / 'run')
         fly_recorded(scenario, folder)
         bag = Bag(folder)
-        told = read_told(bag, folder, None, Path(scratch))
-        recording = Recording(bag, None, lambda share: None, told.steers_by)
-        list(verify(recording, told, [], lambda what, share: None))
+        given = read_settings(bag, folder, None, Path(scratch))
+        recording = Recording(bag, None, lambda share: None, given.steers_by)
+        list(verify(recording, given, [], lambda what, share: None))
 
 
 if __name__ == '__main__':

@@ -31,7 +31,7 @@ from typer.testing import CliRunner
 
 import command_line
 import glider_bringup as glider
-from glider_base.kernel import compiling_told, kernel
+from glider_base.kernel import kernel, on_compiling
 from glider_base.settings import ConfigurationError
 from glider_bringup import console
 from glider_bringup.cli import OF_THE_SCRIPT, app
@@ -610,7 +610,7 @@ def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_p
     state = pickle.loads(pickle.dumps(carried.state))
     carried.restore(state).until()
     assert carried.now['odom_pitch'] == two.to_xarray().odom_pitch.values[-1]
-    with compiling_told(lambda: pytest.fail('a law that was flown before is compiled again')):
+    with on_compiling(lambda: pytest.fail('a law that was flown before is compiled again')):
         glider.fly('current_8deg', changes, law=level)
     shipped = glider.fly('current_8deg', changes)
     assert (one.score['controller'], two.score['controller']) == ('LevelLaw', 'level')
@@ -813,7 +813,7 @@ def test_compiling_shows_a_bar_with_a_clock_on_a_terminal(monkeypatch):
         terminal = console._PlainConsole(file=shown, force_terminal=True, width=120)
         monkeypatch.setattr(console, 'messages', terminal)
         with console.progress_bar('flying', 5, console.ELAPSED) if beside else nullcontext():
-            with compiling_told(partial(console.compiling, 'compiling the law')):
+            with on_compiling(partial(console.compiling, 'compiling the law')):
                 numba.njit(lambda x: x + 1.0)(1.0)
             assert not [bar for bar in console._shown if len(bar.tasks) > 1]
         assert 'compiling the law' in shown.getvalue()
@@ -823,7 +823,7 @@ def test_compiling_shows_a_bar_with_a_clock_on_a_terminal(monkeypatch):
 def test_compiling_is_one_line_where_there_is_no_terminal(monkeypatch):
     shown = io.StringIO()
     monkeypatch.setattr(console, 'messages', console._PlainConsole(file=shown))
-    with compiling_told(partial(console.compiling, 'compiling the law')):
+    with on_compiling(partial(console.compiling, 'compiling the law')):
         numba.njit(lambda x: x + 1.0)(1.0)
         numba.njit(lambda x: x + 2.0)(1.0)
     assert shown.getvalue() == 'compiling the law\n'

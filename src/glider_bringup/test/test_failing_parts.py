@@ -129,7 +129,7 @@ def tick(
     water = water_from_wire(water_to_wire(water))
     plant = plant_step(plant, guarded.command, water, params.plant, TICK_S, guarded.drops)
     state = MissionState(plant, current, navigation, guidance, control, guard)
-    return state, controlled.saturation | guarded.told | (REFUSED if refused else 0)
+    return state, controlled.saturation | guarded.reported | (REFUSED if refused else 0)
 
 
 def flown(state: MissionState, params, ticks: int) -> tuple[MissionState, np.ndarray]:

@@ -117,7 +117,7 @@ def test_lost_input_surfaces_the_vehicle_for_good(flight):
     flight.until(lambda: len(vehicle.commands) > before + 10)
     assert set(vehicle.commands[before:]) == {SAFE}
     flight.until(lambda: vehicle.said('surface: ordered to the surface'))
-    assert flight.guard.state.told & ORDERED
+    assert flight.guard.state.reported & ORDERED
 
 
 @pytest.mark.parametrize('heard', [True, False])
@@ -151,7 +151,7 @@ def test_what_sinks_while_the_guard_is_paused_has_not_jumped(flight):
         flight.guard.begin()
         before = len(vehicle.commands)
         flight.until(lambda: len(vehicle.commands) > before + 25)
-        return bool(flight.guard.state.told & DEPTH_WRONG)
+        return bool(flight.guard.state.reported & DEPTH_WRONG)
 
     assert not sunk(12.0, 60.0)
     assert sunk(50.0, 1.0)
@@ -188,7 +188,7 @@ def test_quaternion_that_is_none_is_bridged_counted_and_told(flight, factor):
     vehicle.says = {**INPUTS, 'odom': none}
     flight.until(lambda: vehicle.said('surface: nothing usable is measured'))
     assert vehicle.commands[-1] == SAFE
-    assert flight.guard.state.told & LOST
+    assert flight.guard.state.reported & LOST
 
 
 def test_frames_of_ned_are_refused_and_named(flight):

@@ -224,8 +224,8 @@ def test_events_that_come_late_are_recorded_with_their_tick(
             publishers[name].publish(message.data)
     listener.executor.spin_once(timeout_sec=1.0)
     assert not acknowledged
-    told = health.Told(f'/glider/{REPLAY}', len(events), last_ns)
-    publishers['/glider/told'].publish(health.told_array(told))
+    told = health.EventCount(f'/glider/{REPLAY}', len(events), last_ns)
+    publishers['/glider/told'].publish(health.count_array(told))
     listener.executor.spin_once(timeout_sec=1.0)
     assert not acknowledged
     assert len(events) > 3

@@ -27,8 +27,8 @@ from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
+from glider_mission.recording.ros.node_settings import read_settings
 from glider_mission.recording.ros.recorded_run import Recording
-from glider_mission.recording.ros.told import read_told
 from glider_mission.recording.ros.verify.check import IDENTICAL
 from glider_mission.recording.ros.verify.every_block import report, verify
 from glider_mission.recording.ros.verify.lockstep import place_ticks
@@ -46,7 +46,7 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 def verified(path, scratch, namespace=None, **options) -> dict:
     """Report on a bag."""
     bag = Bag(path)
-    told = read_told(bag, path, options.get('settings'), scratch)
+    told = read_settings(bag, path, options.get('settings'), scratch)
     recording = Recording(bag, namespace, lambda share: None)
     only = options.get('only', [])
     return report(bag, recording, told, list(verify(recording, told, only, lambda *_: None)))

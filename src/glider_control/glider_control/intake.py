@@ -25,7 +25,7 @@ REFUSED = 64
 #: A change of what is told is told at most once in this time (ns).
 TELL_EVERY_NS = 1_000_000_000
 #: A refusal is told for so long (s): an event is told once a second at most.
-REFUSAL_TOLD_S = 2.0
+REFUSAL_SHOWN_S = 2.0
 
 
 class IntakeParams(NamedTuple):
@@ -43,7 +43,7 @@ class IntakeState(NamedTuple):
     joints_s: float = 0.0  #: time since (s)
     reference: Reference = Reference(*(12 * (0.0,)))
     reference_s: float = 0.0
-    refused_s: float = REFUSAL_TOLD_S  #: time since something was refused
+    refused_s: float = REFUSAL_SHOWN_S  #: time since something was refused
 
 
 @kernel
@@ -83,7 +83,7 @@ def take_in(state, odometry, joints, reference, params, dt):
 @kernel
 def is_refusing(state):
     """Whether something was refused a moment ago."""
-    return state.refused_s < REFUSAL_TOLD_S
+    return state.refused_s < REFUSAL_SHOWN_S
 
 
 @kernel

@@ -63,7 +63,7 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
     recorded = float(uses.joules[predicted].sum())
     if not recorded > 0.0:
         raise ConfigurationError(f'{place}: no energy is recorded in what is to be predicted')
-    told = float((uses.doings[predicted] @ numbers).sum())
+    predicted_j = float((uses.doings[predicted] @ numbers).sum())
     return {
         'vehicle': uses.kind,
         'files': uses.files,
@@ -71,8 +71,8 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
         'fitted_parts': int(source.first_half.sum()),
         'predicted_parts': int(predicted.sum()),
         'recorded_wh': recorded / 3600.0,
-        'predicted_wh': told / 3600.0,
-        'error_percent': 100.0 * (told / recorded - 1.0),
+        'predicted_wh': predicted_j / 3600.0,
+        'error_percent': 100.0 * (predicted_j / recorded - 1.0),
         'measured': uses.masses,
         'notes': uses.notes,
     }
@@ -112,13 +112,13 @@ def _of_one_vehicle(place: Path) -> tuple[list[Path], dict[str, str]]:
     """Files of dives by the vehicle that most are of, each dive once; why others are left out."""
     files, left_out, dives = seaglider_files(place), {}, set()
     named = {path: DIVE_FILE.fullmatch(path.name) for path in files}
-    vehicle = usual_vehicle(place, [told[1] for told in named.values() if told])
-    for path, told in named.items():
-        if told and told[1] != vehicle:
-            left_out[path.name] = f'it is of {told[1]}, most are of {vehicle}'
-        elif told and told[2] in dives:
+    vehicle = usual_vehicle(place, [found[1] for found in named.values() if found])
+    for path, found in named.items():
+        if found and found[1] != vehicle:
+            left_out[path.name] = f'it is of {found[1]}, most are of {vehicle}'
+        elif found and found[2] in dives:
             left_out[path.name] = 'another file is of its dive'
-        dives.add(told[2] if told and path.name not in left_out else '')
+        dives.add(found[2] if found and path.name not in left_out else '')
     return [path for path in files if path.name not in left_out], left_out
 
 
@@ -138,8 +138,8 @@ def _pumpings(path: Path) -> _Dive:
     refuse_missing(path, found, moves, 'for the energy of a Seaglider')
     rows = {key: len(found[key]) for key in moves if key != 'cc_per_count'}
     if len(set(rows.values())) > 1:
-        told = ', '.join(f'{next(iter(moves[key]))} {count}' for key, count in rows.items())
-        raise ConfigurationError(f'{path}: {told} values (allowed: as many of each)')
+        lengths = ', '.join(f'{next(iter(moves[key]))} {count}' for key, count in rows.items())
+        raise ConfigurationError(f'{path}: {lengths} values (allowed: as many of each)')
     counts = found['after_1'] + found['after_2'] - found['before_1'] - found['before_2']
     pumped = 0.5 * counts * found['cc_per_count'][0]
     energy = found['amps'] * found['volts'] * np.abs(found['seconds'])
@@ -154,10 +154,10 @@ def _pumpings(path: Path) -> _Dive:
 
 def _moved(found: dict[str, np.ndarray], name: str) -> np.ndarray:
     """Energy (J) and way (m, deg) of one moving mass in a dive, shape (2,); zeros if not told."""
-    told = [found.get(f'{name}_{key}', ()) for key in names_of(name)]
-    if not all(map(len, told)):
+    columns = [found.get(f'{name}_{key}', ()) for key in names_of(name)]
+    if not all(map(len, columns)):
         return np.zeros(2)
-    before, after, amps, volts, seconds, per_count = told
+    before, after, amps, volts, seconds, per_count = columns
     energy = amps * volts * np.abs(seconds)
     ran = (seconds != 0.0) & (before > 0.0) & np.isfinite(energy * after)
     return np.array([energy[ran].sum(), abs(per_count[0]) * np.abs(after - before)[ran].sum()])

@@ -63,7 +63,7 @@ class Row(NamedTuple):
     dived_m: np.ndarray
     surfaced_m: np.ndarray
     way_m: np.ndarray  #: way through the water between the two (m)
-    told_mps: np.ndarray  #: current that it told afterwards (m/s)
+    reported_mps: np.ndarray  #: current that it told afterwards (m/s)
     #: Distance from where it surfaced to where it was forecast (m), by name; NaN for the first.
     missed_m: dict[str, float]
     over: str  #: what the vehicle's own current is a mean over, see `Flight`
@@ -106,7 +106,7 @@ class _Under(NamedTuple):
     dived_s: float
     surfaced_s: float
     way_m: np.ndarray
-    told_mps: np.ndarray  #: at the end: the current of the segment before
+    reported_mps: np.ndarray  #: at the end: the current of the segment before
 
 
 def _at_surface(stay: Fixes, nearest: int, time_s: float) -> tuple[float, np.ndarray]:
@@ -128,8 +128,8 @@ def _navigated(
     fixes = _fixes_of(run)
     begin_s, end_s = fixes.time_s[0] - 1.0, fixes.time_s[-1] + 1.0
     made_up = Samples(*np.array([end_s, MADE_UP_M, -0.4, 0.0, math.nan])[:, None])
-    told = [*(segment.samples for segment in run), made_up]
-    samples = Samples(*(np.concatenate(values) for values in zip(*told, strict=True)))
+    parts_of_run = [*(segment.samples for segment in run), made_up]
+    samples = Samples(*(np.concatenate(values) for values in zip(*parts_of_run, strict=True)))
     start = _settings(flight, run[0], method, current, fixes.place_m[0])
     block, driver = RecordedBlock(NAVIGATION, start), _Driver(samples, fixes, start)
     edges = [begin_s, *(one.before.time_s[-1] for one in run[1:]), end_s, end_s + MADE_UP_S]
@@ -151,17 +151,17 @@ def _published(block: RecordedBlock, driver: '_Driver', ticks: np.ndarray, begin
     """Times, places, told currents and phases of some ticks."""
     time_s = begin_s + TICK_S * ticks
     outputs, flags = block.run(ticks * TICK_NS, driver.inputs(time_s))
-    told = outputs.get('believed_current', np.full((len(ticks), 2), math.nan))
-    return time_s, outputs['odom'][:, 1::-1], told[:, 1::-1], flags[:, 0]
+    current = outputs.get('believed_current', np.full((len(ticks), 2), math.nan))
+    return time_s, outputs['odom'][:, 1::-1], current[:, 1::-1], flags[:, 0]
 
 
-def _under(time_s, place_m, told_mps, phase, until_s: float) -> _Under:
+def _under(time_s, place_m, reported_mps, phase, until_s: float) -> _Under:
     """What came out of some ticks, of which those under water count until a time."""
     under = np.flatnonzero((phase == UNDER_WATER) & (time_s <= until_s))
     if not len(under):
-        return _Under(math.nan, math.nan, NOT_KNOWN, told_mps[-1])
+        return _Under(math.nan, math.nan, NOT_KNOWN, reported_mps[-1])
     steps = np.diff(place_m, axis=0, prepend=place_m[:1])[under]
-    return _Under(time_s[under[0]], time_s[under[-1]], steps.sum(axis=0), told_mps[-1])
+    return _Under(time_s[under[0]], time_s[under[-1]], steps.sum(axis=0), reported_mps[-1])
 
 
 def _fixes_of(run: Sequence[Segment]) -> Fixes:
@@ -288,18 +288,18 @@ def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[R
         )
         last_mps = None
         for segment, under, one, after in zip(run, still, led, led[1:], strict=False):
-            told = one.way_m, after.told_mps, last_mps
-            rows.append(_row(segment, under, *told, flight.on_board_over))
-            last_mps = after.told_mps
+            reckoned = one.way_m, after.reported_mps, last_mps
+            rows.append(_row(segment, under, *reckoned, flight.on_board_over))
+            last_mps = after.reported_mps
     return rows
 
 
-def _row(segment: Segment, under: _Under, led_m, told_mps, last_mps, over: str) -> Row:
+def _row(segment: Segment, under: _Under, led_m, reported_mps, last_mps, over: str) -> Row:
     """What came out; forecasts know what the dive before told of the current, if there is one."""
     dived_s, dived_m = _at_surface(segment.before, -1, under.dived_s)
     surfaced_s, surfaced_m = _at_surface(segment.after, 0, under.surfaced_s)
     dive, missed = (dived_s, surfaced_s, dived_m, surfaced_m), dict.fromkeys(FORECASTS, math.nan)
-    row = Row(segment, *dive, under.way_m, told_mps, missed, over)
+    row = Row(segment, *dive, under.way_m, reported_mps, missed, over)
     if last_mps is not None:
         for name, current in (('none', np.zeros(2)), ('persistence', last_mps)):
             missed[name] = float(np.hypot(*(row.dac_mps - current))) * row.seconds
@@ -311,7 +311,7 @@ def _row(segment: Segment, under: _Under, led_m, told_mps, last_mps, over: str) 
 def summary(flight: Flight, rows: list[Row], method: str = METHOD) -> dict[str, Any]:
     """Figures of a flight, as `--json` prints them."""
     dac = [np.hypot(*(row.comparable_mps - row.segment.on_board.dac_mps)) for row in rows]
-    told = [np.hypot(*(row.told_mps - row.dac_mps)) for row in rows]
+    differences = [np.hypot(*(row.reported_mps - row.dac_mps)) for row in rows]
     way = [_way_off(row) for row in rows]
     through_water = [np.hypot(*row.way_m) for row in rows]
     ratio = [
@@ -333,7 +333,7 @@ def summary(flight: Flight, rows: list[Row], method: str = METHOD) -> dict[str, 
         'through_water_m': round(float(np.nansum(through_water)), 1),
         'on_board_current_is_mean': flight.on_board_over,
         'dac_difference_mps': _spread(dac, 4),
-        'told_difference_mps': _spread(told, 4),
+        'told_difference_mps': _spread(differences, 4),
         'way_difference_m': _spread(way, 1),
         'way_ratio': _spread(ratio, 4),
         'prediction_m': {name: _spread([row.missed_m[name] for row in rows], 1) for name in names},

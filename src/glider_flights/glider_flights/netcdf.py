@@ -112,8 +112,8 @@ def read(
                 variable = dataset[by_name[name]]
                 values = np.atleast_1d(variable.values).ravel()
                 if key not in _TEXTS:
-                    told = variable.attrs
-                    values = _in_ours(f'{path}: {name}', key, values, told, names[name], scales)
+                    attrs = variable.attrs
+                    values = _in_ours(f'{path}: {name}', key, values, attrs, names[name], scales)
                 found[key] = values
     return found
 
@@ -122,12 +122,12 @@ def _in_ours(
     name: str,
     key: str,
     values: np.ndarray,
-    told: dict,
+    attrs: dict,
     scale: float,
     scales: dict[str, float] | None,
 ) -> np.ndarray:
     """Values of a variable in our units, by its attributes; NaN for what cannot be."""
-    unit = str(told.get('units', ''))
+    unit = str(attrs.get('units', ''))
     try:
         values = values.astype(float)
     except (TypeError, ValueError) as error:
@@ -136,7 +136,7 @@ def _in_ours(
         return _seconds(name, values, unit)
     if scales and key in _USUAL and unit not in scales:
         _refuse_unit(name, unit, key)
-    if key == 'depth_m' and told.get('positive') == 'up':
+    if key == 'depth_m' and attrs.get('positive') == 'up':
         scale = -scale
     values = values * math.copysign((scales or {}).get(unit, scale), scale)
     lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))

@@ -69,8 +69,8 @@ def _is_one(path: Path) -> bool:
             names = {str(name).upper() for part in groups for name in part.variables}
     except ConfigurationError:
         return False
-    told = {'PITCH', 'GLIDER_PITCH', 'LATITUDE_GPS'} & names
-    return 'TIME' in names and bool(told) and 'LOG_GPS_LAT' not in names
+    marks = {'PITCH', 'GLIDER_PITCH', 'LATITUDE_GPS'} & names
+    return 'TIME' in names and bool(marks) and 'LOG_GPS_LAT' not in names
 
 
 def read_og1(place: Path, progress: Progress) -> Flight:
@@ -89,10 +89,10 @@ def _on_board(known: dict[str, np.ndarray], samples: Samples) -> OnBoard:
     """What a file says of the current of a segment with such samples."""
     time_s = known['time']
     inside = (time_s >= samples.time_s[0]) & (time_s <= samples.time_s[-1])
-    told = [known.get(name) for name in ('dac_north', 'dac_east')]
-    if any(values is None for values in told):
+    dac = [known.get(name) for name in ('dac_north', 'dac_east')]
+    if any(values is None for values in dac):
         return OnBoard()
-    return OnBoard(np.array([usual(values[inside]) for values in told]))
+    return OnBoard(np.array([usual(values[inside]) for values in dac]))
 
 
 def _read(path: Path) -> LogFile:
@@ -112,8 +112,8 @@ def _read(path: Path) -> LogFile:
     if 'pressure' in known:
         latitude = fixes[0, 1] if len(fixes) else _middle(known)[0]
         by_pressure = -gsw().z_from_p(known['pressure'], latitude)
-        told = known.get('depth_m', by_pressure)
-        known['depth_m'] = np.where(np.isfinite(by_pressure), by_pressure, told)
+        by_depth = known.get('depth_m', by_pressure)
+        known['depth_m'] = np.where(np.isfinite(by_pressure), by_pressure, by_depth)
     needed = {key: wanted[key] for key in ('time', 'depth_m', 'pitch_rad')}
     refuse_missing(path, known, needed, 'along the time, of a flight in OG1 or CF')
     if 'heading_rad' in known:
@@ -168,9 +168,9 @@ def _own_polar(path: Path) -> Polar | None:
 
 def _declination(known: dict[str, np.ndarray], fixes: np.ndarray) -> tuple[float, str]:
     """Declination (rad, + east) where the flight is, and what is to be said of it."""
-    told = usual(known.get('declination_rad', ()))
-    if math.isfinite(told):
-        return told, ''
+    recorded = usual(known.get('declination_rad', ()))
+    if math.isfinite(recorded):
+        return recorded, ''
     place = fixes[0, 1:] if len(fixes) else _middle(known)
-    declination, told = declination_at(*place, usual(known['time']))
-    return declination, f'HEADING is magnetic, {told}'
+    declination, source = declination_at(*place, usual(known['time']))
+    return declination, f'HEADING is magnetic, {source}'

@@ -140,7 +140,7 @@ class Flight(NamedTuple):
     model: str = ''  #: what a file in OG1 calls the vehicle; '' if it does not say
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """Its files, as an error names them."""
         return ' to '.join(dict.fromkeys((self.files[0], self.files[-1])))
 
@@ -209,10 +209,10 @@ def at_times(
     order = np.argsort(own_s[good], kind='stable')
     own_s, values = own_s[good][order], values[good][order]
     found = np.interp(time_s, own_s, values, left=math.nan, right=math.nan)
-    told_s = np.union1d(own_s, idle_s)
-    after = np.searchsorted(told_s, time_s).clip(1, None)
-    lasts_s = np.append(told_s, math.inf)[after] - told_s[after - 1]
-    return np.where((lasts_s > gap_s) & ~np.isin(time_s, told_s), math.nan, found)
+    reported_s = np.union1d(own_s, idle_s)
+    after = np.searchsorted(reported_s, time_s).clip(1, None)
+    lasts_s = np.append(reported_s, math.inf)[after] - reported_s[after - 1]
+    return np.where((lasts_s > gap_s) & ~np.isin(time_s, reported_s), math.nan, found)
 
 
 def angles_at_times(

@@ -145,10 +145,12 @@ def _body(own: dict[str, float]) -> dict[str, float]:
 
 def polar_of(own: dict[str, float]) -> Polar:
     """The file's own constants of lift and drag, else Eriksen's; angles in degrees there."""
-    told = {name: value for name, value in own.items() if name in ERIKSEN and math.isfinite(value)}
-    if not told.keys() >= set('abc'):
-        told = {name: value for name, value in told.items() if name not in 'abc'}
-    used = ERIKSEN | told
+    known = {
+        name: value for name, value in own.items() if name in ERIKSEN and math.isfinite(value)
+    }
+    if not known.keys() >= set('abc'):
+        known = {name: value for name, value in known.items() if name not in 'abc'}
+    used = ERIKSEN | known
     return Polar(
         lift=math.degrees(used['a']),
         drag=used['b'],

@@ -125,11 +125,11 @@ def read_slocum(
     origin, fixes = _fixes(sensors)
     declined = usual(sensors['m_gps_mag_var'][1])
     if math.isnan(declined):
-        declination, told = declination_at(*origin, usual(sensors['m_gps_lat'][0]))
+        declination, source = declination_at(*origin, usual(sensors['m_gps_lat'][0]))
         declined = -declination
-        notes.append(f'm_gps_mag_var is not recorded: magnetic north is {told}')
-    told = (sensors[name] for name in ('m_pitch', 'm_heading'))
-    cuts, left_out = cut(fixes, samples_of(*sensors['m_depth'], *told, -declined))
+        notes.append(f'm_gps_mag_var is not recorded: magnetic north is {source}')
+    attitude = (sensors[name] for name in ('m_pitch', 'm_heading'))
+    cuts, left_out = cut(fixes, samples_of(*sensors['m_depth'], *attitude, -declined))
     ends = [*(one.before.time_s[-1] for one in cuts), math.inf][1:]
     segments = [
         Segment(
@@ -197,8 +197,8 @@ def _instruments(sensors: Sensors, declined: float, origin: np.ndarray) -> Instr
 
     measured = {'heading_rad': angles_at_times(time_s, *sensors['m_heading']) - declined}
     for key, names in names_of('slocum').items():
-        told = [scale * at_times(time_s, *sensors[name]) for name, scale in names.items()]
-        measured[key] = max(told, key=lambda values: int(np.isfinite(values).sum()))
+        readings = [scale * at_times(time_s, *sensors[name]) for name, scale in names.items()]
+        measured[key] = max(readings, key=lambda values: int(np.isfinite(values).sum()))
     measured['salinity'] = gsw().SP_from_C(
         SIEMENS_PER_METRE * at_times(time_s, *sensors['sci_water_cond']),
         measured['temperature_degc'],
@@ -416,8 +416,8 @@ def _on_board(
     dac = NOT_KNOWN
     for pair in (('m_final_water_vx', 'm_final_water_vy'), ('m_water_vx', 'm_water_vy')):
         if np.isnan(dac).any():
-            told = [_last(sensors[name], surfaced_s - LATE_S, end_s + LATE_S) for name in pair]
-            dac = _true(told[0], told[1], declined)
+            pair_mps = [_last(sensors[name], surfaced_s - LATE_S, end_s + LATE_S) for name in pair]
+            dac = _true(pair_mps[0], pair_mps[1], declined)
     reckoned_s = _last(sensors['m_dr_time'], surfaced_s - LATE_S, end_s + LATE_S, above=0.0)
     if abs(reckoned_s - (surfaced_s - begin_s)) > SAME_TIME * (surfaced_s - begin_s):
         dac = NOT_KNOWN

@@ -84,7 +84,7 @@ def follow(
         _follow(state.roll, joints.mu, command.mu, off.mu, least.mu, dt),
         _follow(state.surface, joints.delta, command.delta, off.delta, least.delta, dt),
     )
-    told = row(STUCK_BUOYANCY, state.buoyancy.waits_s > limits.stall_s)
-    told |= row(STUCK_PITCH, state.pitch.waits_s > limits.stall_s)
-    told |= row(STUCK_ROLL, state.roll.waits_s > limits.stall_s)
-    return state, told | row(STUCK_SURFACE, state.surface.waits_s > limits.stall_s)
+    reported = row(STUCK_BUOYANCY, state.buoyancy.waits_s > limits.stall_s)
+    reported |= row(STUCK_PITCH, state.pitch.waits_s > limits.stall_s)
+    reported |= row(STUCK_ROLL, state.roll.waits_s > limits.stall_s)
+    return state, reported | row(STUCK_SURFACE, state.surface.waits_s > limits.stall_s)

@@ -41,13 +41,13 @@ def guard_tick(state, t_s, inputs, params, dt):
     state, out = guard_step(state, heard, params, dt)
     state = replace(state, t_s=t_s)
     command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)
-    return state, (command, (1.0 if out.drops else 0.0,)), (out.told,)
+    return state, (command, (1.0 if out.drops else 0.0,)), (out.reported,)
 
 
 @kernel
 def guard_surface(state):
     """Bring the vehicle to the surface, now and for good."""
-    return replace(state, told=state.told | ORDERED)
+    return replace(state, reported=state.reported | ORDERED)
 
 
 @kernel
@@ -56,12 +56,12 @@ def guard_clear(state):
     return replace(INITIAL_GUARD, taken=state.taken, command=state.command)
 
 
-def say(told: int) -> Said:
+def say(reported: int) -> Said:
     """Rows that hold, and the reaction to them."""
-    reaction = reaction_of(told)
-    level = 'ok' if not told else 'warn' if reaction <= HOLD else 'error'
-    values = {'guard': told, 'reaction': REACTIONS[reaction]}
-    return Said(level, said_of(told) or 'nothing to react to', values)
+    reaction = reaction_of(reported)
+    level = 'ok' if not reported else 'warn' if reaction <= HOLD else 'error'
+    values = {'guard': reported, 'reaction': REACTIONS[reaction]}
+    return Said(level, said_of(reported) or 'nothing to react to', values)
 
 
 GUARD = Block(

@@ -120,7 +120,7 @@ class GuardState(NamedTuple):
     ascent: Ascent = INITIAL_ASCENT
     fixes: FixWatch = FixWatch()
     command: Joints = _REST  #: the last one
-    told: int = 0  #: rows
+    reported: int = 0  #: rows
     t_s: float = 0.0  #: of this tick (s)
 
 
@@ -132,7 +132,7 @@ class GuardOutput(NamedTuple):
 
     command: Joints
     drops: bool  #: the weight is let go
-    told: int  #: rows
+    reported: int  #: rows
 
 
 @kernel
@@ -168,8 +168,8 @@ def _intake_rows(taken, params):
     """Rows of what is asked for, and of what is not heard any more."""
     hold_s = params.gate.hold_s
     lost = is_lost(taken.gate, params.gate) or taken.joints_s > hold_s or taken.target_s > hold_s
-    told = row(rows.ORDERED, taken.target <= SURFACE_TARGET) | row(rows.LOST, lost)
-    return told | row(rows.NO_DEMAND, taken.demand_s > hold_s)
+    reported = row(rows.ORDERED, taken.target <= SURFACE_TARGET) | row(rows.LOST, lost)
+    return reported | row(rows.NO_DEMAND, taken.demand_s > hold_s)
 
 
 @kernel
@@ -182,23 +182,23 @@ def fix_rows(watch):
 
 
 @kernel
-def _sent(last, demand, told):
+def _sent(last, demand, reported):
     """Where actuators are sent: held level, whether they follow is seen by what is demanded."""
-    if told & rows.HOLDS and not told & (rows.SURFACES | rows.DROPS):
+    if reported & rows.HOLDS and not reported & (rows.SURFACES | rows.DROPS):
         return Joints(last.m_b, last.x_p, demand.mu, demand.delta)
     return last
 
 
 @kernel
-def _react(state, taken, told, glide, is_same, witness, params, dt):
+def _react(state, taken, reported, glide, is_same, witness, params, dt):
     """Ascent a tick later, and the command of this one: what is demanded, held level, or up."""
     demand = taken.demand
-    if told & (rows.SURFACES | rows.DROPS):
-        seen, x_p = not state.told & rows.BLIND, taken.joints.x_p
-        is_stuck = ((told | state.told) & rows.STUCK_PITCH) != 0
+    if reported & (rows.SURFACES | rows.DROPS):
+        seen, x_p = not state.reported & rows.BLIND, taken.joints.x_p
+        is_stuck = ((reported | state.reported) & rows.STUCK_PITCH) != 0
         rise = Rise(
             rate=glide.sinking if seen else (witness.raw - state.witness.raw) / dt,
-            sees=not told & rows.BLIND,
+            sees=not reported & rows.BLIND,
             moves=witness.same_s < params.witness.same_s,
             under=glide.under,
             theta=glide.theta,
@@ -208,23 +208,23 @@ def _react(state, taken, told, glide, is_same, witness, params, dt):
             is_there=is_stuck or abs(x_p - state.command.x_p) <= params.ascent.there,
         )
         return come_up(state.ascent, rise, params.ascent, dt)
-    if told & rows.HOLDS:
+    if reported & rows.HOLDS:
         return INITIAL_ASCENT, Joints(demand.m_b, demand.x_p, 0.0, 0.0)
     return INITIAL_ASCENT, demand
 
 
 @kernel
-def _sounding(state, taken, before, heard, shown, witness, last, told, params):
+def _sounding(state, taken, before, heard, shown, witness, last, reported, params):
     """What a tick tells of the depth: `Sounding`.
 
     ``before`` is the odometry that was believed a tick before, ``last`` where the actuators were
-    sent last, ``told`` the rows that hold by now.
+    sent last, ``reported`` the rows that hold by now.
     """
     x, m_b, rate = taken.gate.odometry, taken.joints.m_b, witness.rate
     north, east, down = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
     sinks = sinking_weight(state.weight, m_b, params.weight)
     neutral = -params.weight.ballast - state.weight.off
-    is_stuck = ((told | state.told) & rows.STUCK_BUOYANCY) != 0
+    is_stuck = ((reported | state.reported) & rows.STUCK_BUOYANCY) != 0
     is_pumped = is_stuck or m_b <= params.ascent.pumped
     led = shown.led if shown.is_glide else 0.0
     # in a slow dive of a light vehicle the pump is on its light side
@@ -233,7 +233,9 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
     ascends = ascends or (is_asked_up and last.m_b < min(0.0, neutral))
     is_afloat = witness.depth <= SURFACE_M
     if heard.health.contact_age_s >= 0.0:
-        is_afloat = is_out(witness) or (witness.depth <= AFLOAT_M and not state.told & rows.BLIND)
+        is_afloat = is_out(witness) or (
+            witness.depth <= AFLOAT_M and not state.reported & rows.BLIND
+        )
     return Sounding(
         odom=x.p_d,
         before=before.p_d,
@@ -251,7 +253,7 @@ def _sounding(state, taken, before, heard, shown, witness, last, told, params):
         altitude=heard.altitude,
         is_sent_up=last.m_b < max(0.0, neutral),
         ascends=ascends,
-        surfaces=(state.told & (rows.SURFACES | rows.DROPS)) != 0,
+        surfaces=(state.reported & (rows.SURFACES | rows.DROPS)) != 0,
         is_pumped=is_pumped,
         is_out=is_out(witness),
         is_afloat=is_afloat,
@@ -267,12 +269,12 @@ def guard_step(
     taken = take_in(state.taken, heard, params, dt)
     last = taken.joints if first else state.command
     before = taken.gate.odometry if first else state.taken.gate.odometry
-    sent = _sent(last, taken.demand, state.told)
-    followers, told = follow(state.followers, taken.joints, sent, params.actuators, dt)
+    sent = _sent(last, taken.demand, state.reported)
+    followers, reported = follow(state.followers, taken.joints, sent, params.actuators, dt)
     x, m_b = taken.gate.odometry, taken.joints.m_b
     theta = pitch_of(x.q_w, x.q_x, x.q_y, x.q_z)
     _, _, rate = rotate_to_ned(x.q_w, x.q_x, x.q_y, x.q_z, x.u, x.v, x.w)
-    sees = not state.told & rows.BLIND
+    sees = not state.reported & rows.BLIND
     attack, _ = glide_attacks(theta, theta, params.weight.polar)
     led, is_glide = led_rate(state.weight, theta, attack, m_b, params.weight)
     shown = Shown(
@@ -289,11 +291,11 @@ def guard_step(
     if first:
         witness, depths = begin_watch(shown.raw, x.p_d), begin_at(x.p_d)
     witness, wrong = watch(witness, shown, sees, params.witness, dt)
-    at = _sounding(state, taken, before, heard, shown, witness, last, told, params)
+    at = _sounding(state, taken, before, heard, shown, witness, last, reported, params)
     depths = sound(depths, at, params.depth, dt)
     # without a depth, a leak alone is certain
-    floods = (state.told & (rows.LEAK | rows.TOO_HEAVY if sees else rows.LEAK)) != 0
-    told |= wrong | depth_rows(depths, at.surfaces, sees, floods, params.depth)
+    floods = (state.reported & (rows.LEAK | rows.TOO_HEAVY if sees else rows.LEAK)) != 0
+    reported |= wrong | depth_rows(depths, at.surfaces, sees, floods, params.depth)
     health, unwell = check_health(state.health, heard.health, heard.battery, params.health, dt)
     sinking = sinking_rate(depths) if sees else rate
     under = witness.depth > SURFACE_M
@@ -310,11 +312,11 @@ def guard_step(
     )
     weight, heavy = weigh(state.weight, glide, params.weight, dt)
     fixes = watch_fixes(state.fixes, heard.odometry, heard.known, dt)
-    told |= unwell | heavy | fix_rows(fixes) | _intake_rows(taken, params)
-    told |= state.told & rows.LATCHED
-    ascent, command = _react(state, taken, told, glide, shown.is_same, witness, params, dt)
+    reported |= unwell | heavy | fix_rows(fixes) | _intake_rows(taken, params)
+    reported |= state.reported & rows.LATCHED
+    ascent, command = _react(state, taken, reported, glide, shown.is_same, witness, params, dt)
     tick = state.tick + 1 if taken.gate.seen else 0
-    output = GuardOutput(command, (told & rows.DROPS) != 0, told)
+    output = GuardOutput(command, (reported & rows.DROPS) != 0, reported)
     state = GuardState(
         tick=tick,
         taken=taken,
@@ -326,7 +328,7 @@ def guard_step(
         ascent=ascent,
         fixes=fixes,
         command=command,
-        told=told,
+        reported=reported,
         t_s=state.t_s,
     )
     return state, output

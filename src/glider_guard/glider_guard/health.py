@@ -39,7 +39,7 @@ def check_health(state, health, battery, limits, dt):
         state.vacuum_s + dt if is_off else 0.0,
         state.battery_s + dt if is_low else 0.0,
     )
-    told = row(LEAK, state.leak_s > limits.health_s)
-    told |= row(VACUUM, state.vacuum_s > limits.health_s)
-    told |= row(BATTERY, state.battery_s > limits.health_s)
-    return state, told | row(NO_CONTACT, health.contact_age_s > limits.contact_s)
+    reported = row(LEAK, state.leak_s > limits.health_s)
+    reported |= row(VACUUM, state.vacuum_s > limits.health_s)
+    reported |= row(BATTERY, state.battery_s > limits.health_s)
+    return state, reported | row(NO_CONTACT, health.contact_age_s > limits.contact_s)

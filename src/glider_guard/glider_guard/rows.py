@@ -242,13 +242,13 @@ LATCHED = sum(row.bit for row in ROWS if row.latches)
 ALL = sum(row.bit for row in ROWS)
 
 
-def reaction_of(told: int) -> int:
+def reaction_of(reported: int) -> int:
     """The gravest reaction to some rows."""
-    return max((row.reaction for row in ROWS if told & row.bit), default=NONE)
+    return max((row.reaction for row in ROWS if reported & row.bit), default=NONE)
 
 
-def say(told: int) -> str:
+def say(reported: int) -> str:
     """What some rows say, in words; empty if they say nothing."""
-    said = '; '.join(row.says for row in ROWS if told & row.bit)
-    reaction = reaction_of(told)
+    said = '; '.join(row.says for row in ROWS if reported & row.bit)
+    reaction = reaction_of(reported)
     return f'{REACTIONS[reaction]}: {said}' if reaction > NOTE else said

@@ -116,7 +116,7 @@ def watch(
 
     ``sees`` says whether the depth has been believed so far.
     """
-    told, raw = 0, shown.raw
+    reported, raw = 0, shown.raw
     is_one = abs(raw) < FARTHEST_M
     led = shown.led if shown.is_glide or not sees else 0.0
     same_s, led_m = state.same_s + dt, state.led_m + dt * led
@@ -131,7 +131,7 @@ def watch(
         far_s = state.far_s + dt
     if far_s > limits.hold_s:
         # at the surface it is checked against 0
-        far_s, told = 0.0, 0 if state.out_s > OUT_S else DEPTH_WRONG
+        far_s, reported = 0.0, 0 if state.out_s > OUT_S else DEPTH_WRONG
     if far_s == 0.0 and raw != own:
         own, own_s = raw, 0.0
     is_out = 0.0 <= shown.contact_age_s < HEARD_S
@@ -143,20 +143,20 @@ def watch(
     # two samples that agree show it higher above the water than any offset does: nobody flies
     is_above = far_s == 0.0 and raw != state.raw and max(own, state.own) < -limits.offset_m
     if is_above or max(abs(own_zero), abs(odom_zero)) > limits.offset_m:
-        told |= DEPTH_WRONG
+        reported |= DEPTH_WRONG
     elif _offset(own_zero) != 0.0 or _offset(odom_zero) != 0.0:
-        told |= DEPTH_OFFSET
+        reported |= DEPTH_OFFSET
     by_own, by_odom = own - _offset(own_zero), shown.odom - _offset(odom_zero)
     depth, rate = by_own, shown.rate
     if far_s == 0.0:
         depth = max(by_own, by_odom)
     if same_s > limits.same_s:
         if abs(led_m) > limits.led_m or (depth > SURFACE_M and not limits.is_rough):
-            told |= FROZEN
+            reported |= FROZEN
     if not sees:
         rate = shown.rate if limits.has_rate and not shown.is_same else shown.led
         depth = 0.0 if out_s > OUT_S else max(0.0, state.depth + dt * rate)
-    elif told & (FROZEN | DEPTH_WRONG):
+    elif reported & (FROZEN | DEPTH_WRONG):
         # the last that was believed, and what has been gone since
         depth = 0.0 if out_s > OUT_S else max(0.0, state.depth + (led_m if same_s > 0.0 else 0.0))
     rate = state.rate + dt / RATE_S * (rate - state.rate)
@@ -173,4 +173,4 @@ def watch(
         depth=depth,
         rate=rate,
         apart_m=abs(by_own - by_odom),
-    ), told
+    ), reported

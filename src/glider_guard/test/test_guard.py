@@ -109,7 +109,7 @@ class Vehicle:
             self.state, self.out, where, ticks, flight, at, self.params, TICK_S
         )
         self.depth, self.time_s, self.joints = where
-        return self.out.told
+        return self.out.reported
 
 
 class Case(NamedTuple):
@@ -402,10 +402,10 @@ def test_a_vehicle_that_grows_heavier_in_a_dive_turns_while_it_can(growth, told)
     vehicle = Vehicle(depth_m=10.0)
     vehicle.target, vehicle.pitch_deg = 900.0, -25.0
     rate = glide_vertical_rate(math.radians(-25.0), 0.4, vehicle.params.weight.polar)
-    while vehicle.depth < 890.0 and not vehicle.out.told:
+    while vehicle.depth < 890.0 and not vehicle.out.reported:
         unknown = growth * vehicle.time_s
         vehicle.go(10.0, demand=DIVES._replace(m_b=0.4 - unknown), rate=rate)
-    assert bool(vehicle.out.told & rows.TOO_HEAVY) == told
+    assert bool(vehicle.out.reported & rows.TOO_HEAVY) == told
     assert not told or unknown < 0.8
 
 
@@ -444,7 +444,7 @@ def test_a_vehicle_that_sinks_fast_is_stopped_in_time():
     vehicle.target, vehicle.pitch_deg = 990.0, -50.0
     while not vehicle.go(1.0, demand=DIVES._replace(m_b=1.0), rate=0.8):
         pass
-    assert vehicle.out.told == rows.TOO_DEEP
+    assert vehicle.out.reported == rows.TOO_DEEP
     assert vehicle.depth == pytest.approx(992.0, abs=2.0)
 
 

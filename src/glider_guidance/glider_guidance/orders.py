@@ -40,9 +40,9 @@ def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
     of_profile = [name for name in changes if name.startswith('profile.')]
     kept = {name.removeprefix('profile.'): changes.pop(name) for name in of_profile}
     profile = settings.profile.model_copy(update=kept)
-    told = settings.model_copy(update={**changes, 'profile': profile})
-    told.check()
-    return told
+    ordered = settings.model_copy(update={**changes, 'profile': profile})
+    ordered.check()
+    return ordered
 
 
 def due(orders: Iterable[Order], tick: int, stage: int) -> list[Order]:

@@ -101,7 +101,7 @@ def set_field(values: dict, field: str, value, given: Collection[str]) -> bool:
     return is_new
 
 
-def told_fields(changed: dict[str, str]) -> str:
+def fields_text(changed: dict[str, str]) -> str:
     """Fields that were changed, as a person set them."""
     return ', '.join(f'{field}={value}' for field, value in changed.items())
 

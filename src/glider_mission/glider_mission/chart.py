@@ -62,11 +62,11 @@ def places(waypoints: Any) -> list[tuple[float, float]]:
 
     A ValueError names the waypoint, its value and what is allowed.
     """
-    told = 'waypoints_latlon'
+    field = 'waypoints_latlon'
     if isinstance(waypoints, str) and waypoints.lower().endswith(SUFFIX):
-        told, waypoints = f'file {waypoints}', read_goto_list(Path(waypoints))
+        field, waypoints = f'file {waypoints}', read_goto_list(Path(waypoints))
     if not isinstance(waypoints, list | tuple) or len(waypoints) < 2:
-        raise ValueError(f'{told}: no list of waypoints to fly along (allowed: 2 and more)')
+        raise ValueError(f'{field}: no list of waypoints to fly along (allowed: 2 and more)')
     found = []
     for number, point in enumerate(waypoints):
         name = f'waypoints_latlon.{number}'
@@ -99,12 +99,12 @@ def in_metres(path: Any, settings: OriginSettings | None) -> Any:
     if isinstance(path['waypoints_latlon'], str):
         path = {**path, 'waypoints_latlon': found}
     for number, place in enumerate(found):
-        name = f'waypoints_latlon.{number}: {place_told(*place)}'
+        name = f'waypoints_latlon.{number}: {place_text(*place)}'
         north, east = from_geodetic(*place, origin)
         if max(abs(north), abs(east)) > MAX_DISTANCE_M:
             raise ValueError(
                 f'{name}: {max(abs(north), abs(east)) / 1e3:,.0f} km from the chart origin, '
-                f'{place_told(origin.latitude, origin.longitude)} (allowed: '
+                f'{place_text(origin.latitude, origin.longitude)} (allowed: '
                 f'<= {MAX_DISTANCE_M / 1e3:,.0f} km)'
             )
         off = stretch(place[0], origin)
@@ -181,7 +181,7 @@ def _middle(points: list[tuple[float, float]]) -> dict[str, float]:
     }
 
 
-def place_told(latitude: float, longitude: float) -> str:
+def place_text(latitude: float, longitude: float) -> str:
     """A place (deg) as a person reads it, to a metre or so: 36.25000 N, 122.30000 E."""
     north, east = 'N' if latitude >= 0.0 else 'S', 'E' if longitude >= 0.0 else 'W'
     return f'{abs(latitude):.5f} {north}, {abs(longitude):.5f} {east}'

@@ -351,11 +351,11 @@ def mafiles(
         f'b_arg: num_waypoints(nodim) {len(places)}',
     ]
     tail = ['<start:waypoints>', '# LON LAT', *waypoints, '<end:waypoints>']
-    told = ' '.join(name.split())
+    title = ' '.join(name.split())
     return {
-        f'goto_l10{SUFFIX}': _text(told, 'goto_list', profile, list_only, tail),
-        f'yo10{SUFFIX}': _text(told, 'yo', profile),
-        f'surfac10{SUFFIX}': _text(told, 'surface', profile),
+        f'goto_l10{SUFFIX}': _text(title, 'goto_list', profile, list_only, tail),
+        f'yo10{SUFFIX}': _text(title, 'yo', profile),
+        f'surfac10{SUFFIX}': _text(title, 'surface', profile),
     }
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pydantic
 from pydantic import Field
 
-from glider_base.errors import shown, told_changes
+from glider_base.errors import changes_text, shown
 from glider_base.files import is_file, read_yaml, yaml_line, yaml_text
 from glider_base.frames import OriginSettings, to_geodetic
 from glider_base.settings import (
@@ -38,12 +38,12 @@ from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
 from glider_mission.changes import (
     VEHICLE,
+    fields_text,
     given_fields,
     overlap,
     plain,
     set_field,
     split_changes,
-    told_fields,
 )
 from glider_mission.chart import charted, in_metres, uncharted
 from glider_mission.mafiles import from_folder, with_mafiles
@@ -52,7 +52,7 @@ from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
 from glider_model.ocean.field import Mission
 from glider_model.ocean.fields.grid import GridFileSettings
-from glider_model.ocean.grid_file import told_time
+from glider_model.ocean.grid_file import time_text
 from glider_model.ocean.water import WaterSettings
 from glider_model.onboard.gate import GateSettings
 from glider_model.plant.faults.settings import FAULTS, Fault, FaultSettings, Message, check_fitted
@@ -203,7 +203,7 @@ class Scenario(Settings):
     @property
     def described(self) -> str:
         """Its description, and what is not as described."""
-        but = f'but with {told_fields(self.changed)}' if self.changed else ''
+        but = f'but with {fields_text(self.changed)}' if self.changed else ''
         return ', '.join(filter(None, (self.description, but)))
 
     @property
@@ -237,7 +237,7 @@ class Scenario(Settings):
 
     def plant_settings(self) -> PlantSettings:
         """What the plant node is told."""
-        return _told(
+        return _settings_of(
             PlantSettings,
             self,
             water=self.resolved_water(),
@@ -333,12 +333,12 @@ class Scenario(Settings):
         """What the navigation node is told."""
         sources = self.navigation, self.initial, self.sensors, self
         forecast = self.resolved_current(self.navigation.forecast)
-        return _told(NavigationSettings, *sources, forecast=forecast)
+        return _settings_of(NavigationSettings, *sources, forecast=forecast)
 
     def guidance_settings(self) -> GuidanceSettings:
         """What the guidance node is told."""
         altitude, gate = 'altitude' in self.topics, self._gate(self.guidance)
-        return _told(GuidanceSettings, self.guidance, self, altitude=altitude, gate=gate)
+        return _settings_of(GuidanceSettings, self.guidance, self, altitude=altitude, gate=gate)
 
     def _gate(self, law: GuidanceLawSettings | ControlLawSettings | GuardLimitSettings):
         """Gate of a law that is told where the vehicle believes it is.
@@ -351,13 +351,13 @@ class Scenario(Settings):
 
     def control_settings(self) -> ControlSettings:
         """What the control node is told."""
-        return _told(self.control_kind, self.control, self, gate=self._gate(self.control))
+        return _settings_of(self.control_kind, self.control, self, gate=self._gate(self.control))
 
     def guard_settings(self) -> GuardSettings:
         """What the guard node is told."""
         has = {name: name in self.topics for name in ('pressure', 'altitude')}
         gate = self._gate(self.guard)
-        return _told(GuardSettings, self.guard, self.sensors, self, gate=gate, **has)
+        return _settings_of(GuardSettings, self.guard, self.sensors, self, gate=gate, **has)
 
     def block_settings(self) -> tuple[Settings, ...]:
         """What the node of each block is told, in the order of `glider_mission.blocks`."""
@@ -433,12 +433,12 @@ class Scenario(Settings):
         return yaml_text({**values, 'vehicle': vehicle or self.vehicle})
 
 
-def _told(kind: type[SettingsT], *sources: Settings, **told: Any) -> SettingsT:
+def _settings_of(kind: type[SettingsT], *sources: Settings, **given: Any) -> SettingsT:
     """Settings of a kind: what is told, else what the first of the sources has by that name."""
     for source in sources:
-        names = type(source).model_fields.keys() & kind.model_fields.keys() - told.keys()
-        told |= {name: getattr(source, name) for name in names}
-    return kind(**told)
+        names = type(source).model_fields.keys() & kind.model_fields.keys() - given.keys()
+        given |= {name: getattr(source, name) for name in names}
+    return kind(**given)
 
 
 #: Kinds of scenario that know one law more, which this program brought, by its name.
@@ -453,9 +453,9 @@ def know_law(law: type[LawSettings]) -> str:
     """
     name = law.__name__
     check_law(name, law)
-    told, flown = with_law(name, law)
+    control, flown = with_law(name, law)
     known = pydantic.create_model(
-        'Scenario', __base__=Scenario, control=(told, Field(told(), description='control'))
+        'Scenario', __base__=Scenario, control=(control, Field(control(), description='control'))
     )
     known.control_kind = flown
     _WITH_LAW[name] = known
@@ -529,7 +529,7 @@ def make_scenario(
     if fields:
         before = values.get('changed')
         values['changed'] = {**(before if isinstance(before, dict) else {}), **fields}
-    changed = told_changes(changes)
+    changed = changes_text(changes)
 
     def line_of(location: tuple[str, ...]) -> int | None:
         name = '.'.join(location)
@@ -543,17 +543,17 @@ def make_scenario(
             kind or _kind(values), values, str(path), path.parent, line_of, changed
         )
     except ConfigurationError as error:
-        told = [str(error)]
+        lines = [str(error)]
         if isinstance(values.get(VEHICLE), str):  # a wrong one is not found out only later
             try:
                 _vehicle_called(values[VEHICLE], path.parent, in_line)
             except ConfigurationError as other:
-                told.append(str(other))
-        raise ConfigurationError('\n'.join(told)) from None
+                lines.append(str(other))
+        raise ConfigurationError('\n'.join(lines)) from None
     name = changed_vehicle(_vehicle_called(scenario.vehicle, path.parent, in_line), in_vehicle)
     scenario = _with_vehicle(scenario, name, f'{path}{changed}')
     if not recorded:
-        with told_of(f'{path}{changed}: '):
+        with named_in(f'{path}{changed}: '):
             _check_glide(scenario)
             return _with_known_fields(scenario)
     return scenario
@@ -607,37 +607,37 @@ def _check_glide(scenario: Scenario) -> None:
 
 def _with_known_fields(scenario: Scenario) -> Scenario:
     """Scenario that says which files its currents are from, once they were read."""
-    told = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
+    currents = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
     starts, is_charted = {}, bool(scenario.bathymetry.file)
-    for name, current in told.items():
+    for name, current in currents.items():
         if current.field is None:
             continue
-        with told_of(f'{name}.field.', ValueError):
+        with named_in(f'{name}.field.', ValueError):
             field = current.field.known()
             resolved = scenario.resolved_current(current).field
             resolved.params()
             if isinstance(resolved, GridFileSettings):
                 check_ways(scenario, resolved, name == 'current' and not is_charted)
                 starts[f'{name}.field.file'] = resolved.start_s
-        told[name] = current.model_copy(update={'field': field})
+        currents[name] = current.model_copy(update={'field': field})
     bathymetry = scenario.bathymetry
     if is_charted:
-        with told_of('bathymetry.', ValueError):
+        with named_in('bathymetry.', ValueError):
             bathymetry = bathymetry.known()
             scenario.bottom()
             check_ways(scenario, bathymetry.resolved(scenario.mission()), True)
     water = scenario.water
     if water.grid.file:
-        with told_of('water.grid.', ValueError):
+        with named_in('water.grid.', ValueError):
             water = water.model_copy(update={'grid': water.grid.known()})
             resolved = scenario.resolved_water()
             resolved.params()
             check_ways(scenario, resolved.grid, not is_charted)
             starts['water.grid.file'] = resolved.grid.start_s
     check_starts(starts)
-    forecast = {'forecast': told['navigation.forecast']}
+    forecast = {'forecast': currents['navigation.forecast']}
     navigation = scenario.navigation.model_copy(update=forecast)
-    changed = {'current': told['current'], 'navigation': navigation}
+    changed = {'current': currents['current'], 'navigation': navigation}
     changed |= {'bathymetry': bathymetry, 'water': water}
     return scenario.model_copy(update=changed)
 
@@ -657,7 +657,7 @@ def check_starts(starts: dict[str, float | None]) -> None:
     """Refuse files that a mission without a time would meet at different times (s since 1970)."""
     found = {name: start_s for name, start_s in starts.items() if start_s is not None}
     if len(set(found.values())) > 1:
-        begin = ', '.join(f'{name} at {told_time(start_s)}' for name, start_s in found.items())
+        begin = ', '.join(f'{name} at {time_text(start_s)}' for name, start_s in found.items())
         raise ConfigurationError(
             f'origin.time: missing, and files begin at different times: {begin} (allowed: the '
             'start of the mission, within the times of all of them)'
@@ -674,7 +674,7 @@ def load_scenario(
 
 
 @contextmanager
-def told_of(what: str, kind: type[ValueError] = ConfigurationError) -> Iterator[None]:
+def named_in(what: str, kind: type[ValueError] = ConfigurationError) -> Iterator[None]:
     """Begin the errors of a kind that the block raises with what they are of."""
     try:
         yield
@@ -685,7 +685,7 @@ def told_of(what: str, kind: type[ValueError] = ConfigurationError) -> Iterator[
 def _with_vehicle(scenario: Scenario, name: str, source: str) -> Scenario:
     """Scenario whose vehicle is known to be good, wherever nodes are started from."""
     vehicle = load_vehicle(name)
-    with told_of(f'{source}: '):
+    with named_in(f'{source}: '):
         perturbed(vehicle.params(), scenario.perturb)
         scenario.control.steering(vehicle.steers_by)
         gyro, topics = scenario.sensors.gyro, scenario.topics
@@ -700,5 +700,5 @@ def _vehicle_called(name: str, folder: Path, source: str) -> str:
     beside = folder / name
     if beside.suffix and is_file(beside):
         name = str(beside.resolve())
-    with told_of(f'{source}: '):
+    with named_in(f'{source}: '):
         return str(vehicle_path(name).resolve())

@@ -28,7 +28,7 @@ from glider_model.onboard.gate import (
 from glider_navigation.method import Fix, Heard
 
 #: A refusal is told for so long (s), lest every sample of a sensor that fails is an event.
-REFUSAL_TOLD_S = 2.0
+REFUSAL_SHOWN_S = 2.0
 #: Deeper or higher than this no sensor shows (m).
 DEPTH_MAX_M = 12000.0
 
@@ -54,7 +54,7 @@ class IntakeState(NamedTuple):
     depth_s: float = 0.0
     seen: bool = False  #: there has been an attitude
     sounded: bool = False  #: there has been a depth
-    refused_s: float = REFUSAL_TOLD_S  #: since something was refused
+    refused_s: float = REFUSAL_SHOWN_S  #: since something was refused
 
 
 @kernel
@@ -129,7 +129,7 @@ def take_in(
 @kernel
 def is_refusing(state):
     """Whether something was refused a moment ago."""
-    return state.refused_s < REFUSAL_TOLD_S
+    return state.refused_s < REFUSAL_SHOWN_S
 
 
 @kernel

@@ -44,9 +44,9 @@ def write_bottom(seed: int, path: Path) -> None:
         name: (name, values, {'standard_name': standard, 'units': f'degrees_{side}'})
         for name, (standard, side, values) in axes.items()
     }
-    told = {'standard_name': 'height_above_mean_sea_level', 'units': 'm'}
+    attrs = {'standard_name': 'height_above_mean_sea_level', 'units': 'm'}
     heights = -np.maximum(depth, 50.0).round().astype(np.int16)
-    data = xarray.Dataset({'elevation': (tuple(axes), heights, told)}, coords)
+    data = xarray.Dataset({'elevation': (tuple(axes), heights, attrs)}, coords)
     data.to_netcdf(path, engine='scipy')
 
 
@@ -83,11 +83,11 @@ def experiment(seed: int) -> Experiment:
     """The bottoms of a seed, in both ways."""
 
     def rows(found: dict[tuple[int, str], dict]) -> tuple[list[dict], dict]:
-        told = []
+        table = []
         for way in WAYS:
             flown = [one for key, one in found.items() if key[1] == way]
             hit, heights = [one for one in flown if one['touched']], [x['least_m'] for x in flown]
-            told.append(
+            table.append(
                 {
                     'way': way,
                     'bottoms': len(flown),
@@ -99,7 +99,7 @@ def experiment(seed: int) -> Experiment:
                     'p50_m': float(np.median(heights)),
                 }
             )
-        return told, {}
+        return table, {}
 
     first = FIRST + COUNT * seed
     tasks = {(one, way): (one, way) for one in range(first, first + COUNT) for way in WAYS}

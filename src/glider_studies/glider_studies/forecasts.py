@@ -70,15 +70,15 @@ def experiment(seed: int) -> Experiment:
     """The seas of a seed, reckoned through in all ways."""
 
     def rows(found: dict[tuple, list[float]]) -> tuple[list[dict], dict]:
-        told = []
+        table = []
         for way, error in CASES:
             off = np.concatenate(
                 [misses for key, misses in found.items() if key[1:] == (way, error)]
             )
             p50, p90 = np.quantile(off, (0.5, 0.9)).tolist()
             figures = {'surfacings': len(off), 'p50_m': p50, 'p90_m': p90}
-            told.append({'way': way, 'error_mps': error, **figures})
-        return told, {}
+            table.append({'way': way, 'error_mps': error, **figures})
+        return table, {}
 
     seas = enumerate(SIZES, FIRST + len(SIZES) * seed)
     tasks = {(sea, *case): (sea, rms, *case) for sea, rms in seas for case in CASES}

@@ -267,10 +267,10 @@ def _farthest_m(scores: dict) -> float:
 
     The first ways of such a flight are not counted: nobody has told it of the current.
     """
-    told = scores['navigation']
-    if told['ellipse_95_share'] is None:
+    navigation = scores['navigation']
+    if navigation['ellipse_95_share'] is None:
         return scores['cross_track_m']['max_all'] or 0.0
-    return max(map(abs, told['surfacing_cross_track_m'][FOURTH:]), default=0.0)
+    return max(map(abs, navigation['surfacing_cross_track_m'][FOURTH:]), default=0.0)
 
 
 def _fly_plant(scenario: Scenario) -> dict[str, Any]:
@@ -396,5 +396,5 @@ def report(
             {'plant': plant, **sampled, 'airframe': frame, 'flights': runs, 'commands': again}
         )
     rows = _rows(flights, airframes)
-    told = {'scenario': base.name, 'plants': len(airframes), 'seed': seed, 'rows': rows}
-    return {**told, 'flown': plants}
+    result = {'scenario': base.name, 'plants': len(airframes), 'seed': seed, 'rows': rows}
+    return {**result, 'flown': plants}

@@ -399,7 +399,7 @@ SHORT = {'duration_s': 1200.0, 'profile.depth_m': 50.0, 'settle_s': 60.0}
 def test_results_do_not_depend_on_workers():
     cases = [Case('', law, 'los_current', 'current_8deg', SHORT) for law in ('adaptive', 'pid')]
     told = Case('told', 'pid', 'los_current', 'current_8deg', {**SHORT, 'vehicle': 'seawing'})
-    cases += [told, told._replace(told='zhang2021')]
+    cases += [told, told._replace(steering_of='zhang2021')]
     one = Experiment('current', 'short', '', '', '', cases, judge_limits({}))
     counts, results = [], []
     for workers in (1, 2):

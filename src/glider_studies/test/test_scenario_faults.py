@@ -9,8 +9,8 @@ import pytest
 from command_line import glider
 from glider_base.settings import ConfigurationError, find_field, unit_of
 from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.ros.node_settings import read_settings
 from glider_mission.recording.ros.recorded_run import Recording
-from glider_mission.recording.ros.told import read_told
 from glider_mission.recording.ros.verify.every_block import verify
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.plant.faults.settings import check_fitted
@@ -125,7 +125,7 @@ def test_a_run_tells_of_its_faults_and_verify_computes_them_again(written, tmp_p
     recording = Recording(bag, None, lambda share: None)
     verdicts = {
         one.block: one
-        for one in verify(recording, read_told(bag, out, None, tmp_path), [], lambda *_: None)
+        for one in verify(recording, read_settings(bag, out, None, tmp_path), [], lambda *_: None)
     }
     assert not verdicts['plant'].differing
     assert verdicts['plant'].ticks == 4000

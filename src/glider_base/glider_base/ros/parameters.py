@@ -66,8 +66,8 @@ class _Leaf(NamedTuple):
     def limits(self) -> tuple | None:
         """Smallest and largest value of a number; None if everything is allowed."""
         largest = _LARGEST.get(self.kind)
-        told = limits(self.field) if largest else {}
-        found = {key[0]: self.kind(limit) for key, limit in told.items()}
+        bounds = limits(self.field) if largest else {}
+        found = {key[0]: self.kind(limit) for key, limit in bounds.items()}
         return (found.get('g', -largest), found.get('l', largest)) if found else None
 
 

@@ -62,21 +62,21 @@ def ocean(
         with whole_file(file) as stream:
             write_sea(EddyingSea(seed=make, rms_mps=rms, error_mps=error), Path(stream.name))
     with messages.status('reading'):
-        told, sea = look(file)
+        listing, sea = look(file)
         refused = ''
         if mission is not None:
             try:
-                sea = mission_in(told, mission)
+                sea = mission_in(listing, mission)
             except ConfigurationError as error:
                 sea, refused = None, str(error)
-            told['mission'] = {'scenario': mission, 'covered': not refused, 'reason': refused}
+            listing['mission'] = {'scenario': mission, 'covered': not refused, 'reason': refused}
         if out and sea:
             draw_sea(sea, out)
-            told['drawn'] = str(out)
+            listing['drawn'] = str(out)
     if as_json:
-        print(json.dumps(told, allow_nan=False))
+        print(json.dumps(listing, allow_nan=False))
     else:
-        print_table(str(file), (), in_words(told))
+        print_table(str(file), (), in_words(listing))
     if refused:
         raise ConfigurationError(refused)
     if out and not as_json:

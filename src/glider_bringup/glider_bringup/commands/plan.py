@@ -12,7 +12,7 @@ import typer
 from glider_base.frames import to_geodetic
 from glider_bringup.console import Changes, Json, Named, changed_fields, counter, print_table
 from glider_bringup.showing.words import count, span
-from glider_mission.chart import place_told
+from glider_mission.chart import place_text
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 
 app = typer.Typer()
@@ -42,11 +42,11 @@ def plan(
         from glider_bringup.showing.ocean import draw_plan
 
         draw_plan(made, planned, out)
-    told = _told(made, planned)
+    report = _report(made, planned)
     if as_json:
-        print(json.dumps(told, allow_nan=False))
+        print(json.dumps(report, allow_nan=False))
     else:
-        print_table(f'{planned.name}: {planned.described}', (), _rows(told))
+        print_table(f'{planned.name}: {planned.described}', (), _rows(report))
 
 
 def _hours(seconds: float) -> float | None:
@@ -54,7 +54,7 @@ def _hours(seconds: float) -> float | None:
     return seconds / 3600.0 if math.isfinite(seconds) else None
 
 
-def _told(made: Any, scenario: Scenario) -> dict[str, Any]:
+def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
     """What a plan says, for machines."""
     origin = scenario.origin.params()
     corners = [to_geodetic(*map(float, corner), origin) for corner in made.route.corners]
@@ -91,31 +91,31 @@ def _notes(made: Any, scenario: Scenario) -> list[str]:
     return notes
 
 
-def _rows(told: dict[str, Any]) -> list[tuple[str, str]]:
+def _rows(report: dict[str, Any]) -> list[tuple[str, str]]:
     """The same for a person."""
 
     def when(hours: float | None) -> str:
         return 'not in its time' if hours is None else span(3600.0 * hours)
 
-    arrival = told['arrival_h']
+    arrival = report['arrival_h']
     bands = when(arrival['p50'])
     if len(set(arrival.values())) > 1:
         bands += f' (p10 {when(arrival["p10"])}, p90 {when(arrival["p90"])})'
-    its_time = span(3600.0 * told['mission_h'])
-    if told['dives']:
-        its_time = f'its {told["dives"]} dive{"s" * (told["dives"] != 1)}, {its_time}'
-    reach = 'yes' if told['reachable'] else f'not in {its_time}'
+    its_time = span(3600.0 * report['mission_h'])
+    if report['dives']:
+        its_time = f'its {report["dives"]} dive{"s" * (report["dives"] != 1)}, {its_time}'
+    reach = 'yes' if report['reachable'] else f'not in {its_time}'
     rows = [
         ('reachable', reach),
         ('arrival, planned', bands),
-        ('arrival, straight legs', when(told['straight_h'])),
-        ('energy', '-' if told['wh'] is None else f'{told["wh"]:.0f} Wh'),
-        ('surfacings', '-' if told['surfacings'] is None else str(told['surfacings'])),
-        ('through the water', f'{told["speed_mps"]:.3f} m/s, surface intervals included'),
+        ('arrival, straight legs', when(report['straight_h'])),
+        ('energy', '-' if report['wh'] is None else f'{report["wh"]:.0f} Wh'),
+        ('surfacings', '-' if report['surfacings'] is None else str(report['surfacings'])),
+        ('through the water', f'{report["speed_mps"]:.3f} m/s, surface intervals included'),
     ]
-    rows += [('note', note) for note in told['notes']]
+    rows += [('note', note) for note in report['notes']]
     rows += [
-        (f'corner {number}' if number else 'start', place_told(*place))
-        for number, place in enumerate(told['route_latlon'])
+        (f'corner {number}' if number else 'start', place_text(*place))
+        for number, place in enumerate(report['route_latlon'])
     ]
     return rows

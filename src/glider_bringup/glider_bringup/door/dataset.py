@@ -27,7 +27,7 @@ from glider_base.kernel import kernel, source_digest
 from glider_base.kernels.packing import put
 from glider_base.signals import TICK_NS, Adaptation
 from glider_base.wiring import NO_ECHO
-from glider_bringup.scoring.outcome import as_told
+from glider_bringup.scoring.outcome import as_reported
 from glider_control.control import (
     SATURATED_BUOYANCY,
     SATURATED_PITCH,
@@ -217,8 +217,8 @@ def _turn(log, out):
         motion = (true.p_n, true.p_e, true.p_d)
         attitude = euler_from_quaternion(true.q_w, true.q_x, true.q_y, true.q_z)
         wrench = wrench_from_wire(log[row, _WRENCH : _WRENCH + 3])
-        told = (believed, angles, reference, water, estimate, motion, attitude, wrench)
-        put(out, row, 0, told)
+        turned = (believed, angles, reference, water, estimate, motion, attitude, wrench)
+        put(out, row, 0, turned)
 
 
 def _numbers(log: np.ndarray, steers_by: str) -> dict[str, tuple]:
@@ -292,7 +292,7 @@ def _bits(flag: str, log: np.ndarray, what: str, names: dict[int, str]) -> tuple
         'flag_masks': np.array(list(names), dtype=np.int32),
         'flag_meanings': ' '.join(names.values()),
     }
-    return 'time', as_told(log[:, COLUMNS[flag]]).astype(np.int32), about
+    return 'time', as_reported(log[:, COLUMNS[flag]]).astype(np.int32), about
 
 
 def _flags(log: np.ndarray) -> dict[str, tuple]:
@@ -313,11 +313,11 @@ def _flags(log: np.ndarray) -> dict[str, tuple]:
         SATURATED_SURFACE: 'steering_surface_at_limit',
         REFUSED: 'measurement_refused',
     }
-    told = {'units': '1', 'topic': '/diagnostics'}
+    source = {'units': '1', 'topic': '/diagnostics'}
     return {
-        'stage': ('time', stage, told | stages),
-        'infeasible': ('time', log[:, COLUMNS['infeasible']].astype(np.int8), told | course),
-        'no_progress': ('time', log[:, COLUMNS['no_progress']].astype(np.int32), told | stays),
+        'stage': ('time', stage, source | stages),
+        'infeasible': ('time', log[:, COLUMNS['infeasible']].astype(np.int8), source | course),
+        'no_progress': ('time', log[:, COLUMNS['no_progress']].astype(np.int32), source | stays),
         'saturation': _bits('saturation', log, 'what control notices', bits),
         'guard': _bits('guard', log, 'what the guard tells', {row.bit: row.name for row in ROWS}),
     }

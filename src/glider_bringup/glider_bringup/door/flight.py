@@ -15,7 +15,7 @@ from glider_base.settings import ConfigurationError, validate
 from glider_base.signals import TICK_S
 from glider_bringup.console import compiling
 from glider_bringup.door.run import chosen_scenario
-from glider_bringup.engines.compiling import told
+from glider_bringup.engines.compiling import shown_once
 from glider_bringup.engines.direct import FlightError, fault_of, finite_rows
 from glider_bringup.engines.flight import Held, Kept, refuse_message_faults, refuse_planned_route
 from glider_bringup.scoring.scores import seconds
@@ -119,7 +119,7 @@ class Flight:
         refuse_message_faults(self.scenario)
         refuse_planned_route(self.scenario)
         self._log = np.empty((_LOOK_TICKS, ROW))
-        with told(combination_of(self.scenario), compiling):
+        with shown_once(combination_of(self.scenario), compiling):
             self._held = Held(self.scenario)
         self._past = Past(None, False, False, tuple(self.scenario.orders))
 

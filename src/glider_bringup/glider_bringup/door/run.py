@@ -16,7 +16,7 @@ import numpy as np
 
 from glider_base.ros.places import given_domain
 from glider_base.settings import ConfigurationError, path_of
-from glider_bringup.engines.compiling import told
+from glider_bringup.engines.compiling import shown_once
 from glider_bringup.engines.flight import Progress, Taker
 from glider_bringup.engines.flight import fly as fly_direct
 from glider_bringup.scoring.card import scorecard, write_score
@@ -265,7 +265,7 @@ def fly_by(
 
     scorer, (flying, reading) = Scorer(scenario), shown
     takers = [scorer, *takers]
-    with told(combination_of(scenario), compiling) if engine == 'direct' else nullcontext():
+    with shown_once(combination_of(scenario), compiling) if engine == 'direct' else nullcontext():
         if engine == 'direct' and not bag:  # nothing of ROS is needed
             flight = fly_direct(scenario, takers, flying)
         else:

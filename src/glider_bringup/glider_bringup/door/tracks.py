@@ -51,7 +51,7 @@ class Point(NamedTuple):
     name: str
     place: tuple[float, float]  #: latitude, longitude (deg)
     time: str
-    told: dict[str, Any]  #: what else is known of it
+    about: dict[str, Any]  #: what else is known of it
 
 
 class Chart(NamedTuple):
@@ -78,19 +78,19 @@ def start_of(scenario: Scenario, start: str | None) -> float | None:
 
     Raises ConfigurationError if both say it, or it is no time.
     """
-    told = scenario.origin.time
+    own = scenario.origin.time
     if start is not None:
-        if told:
+        if own:
             raise ConfigurationError(
-                f'--start {start}: the run has origin.time = {told} (allowed: without --start)'
+                f'--start {start}: the run has origin.time = {own} (allowed: without --start)'
             )
         try:
-            told = OriginSettings(time=start).time
+            own = OriginSettings(time=start).time
         except ValueError:
-            told = ''
-        if not told:
+            own = ''
+        if not own:
             raise ConfigurationError(f'--start {start}: not a time (allowed: as 2026-03-01T06:00)')
-    return datetime.fromisoformat(told.replace('Z', '+00:00')).timestamp() if told else None
+    return datetime.fromisoformat(own.replace('Z', '+00:00')).timestamp() if own else None
 
 
 def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
@@ -161,9 +161,9 @@ def geojson(chart: Chart) -> bytes:
     def at(latitude: float, longitude: float, depth: float | None = None) -> list[float]:
         return [round(longitude, 7), round(latitude, 7), *([] if depth is None else [-depth])]
 
-    def feature(kind: str, coordinates: list, **told: Any) -> dict[str, Any]:
+    def feature(kind: str, coordinates: list, **about: Any) -> dict[str, Any]:
         geometry = {'type': kind, 'coordinates': coordinates}
-        return {'type': 'Feature', 'properties': told, 'geometry': geometry}
+        return {'type': 'Feature', 'properties': about, 'geometry': geometry}
 
     features = []
     for line in chart.all_lines:
@@ -173,11 +173,11 @@ def geojson(chart: Chart) -> bytes:
         kind = 'MultiLineString'
         if len(parts) == 1:
             kind, inside, when = 'LineString', inside[0], when and when[0]
-        told = {'name': line.name} | ({'times': when} if when else {})
-        features.append(feature(kind, inside, **told))
+        about = {'name': line.name} | ({'times': when} if when else {})
+        features.append(feature(kind, inside, **about))
     for point in chart.surfacings:
-        told = {'name': point.name} | ({'time': point.time} if point.time else {}) | point.told
-        features.append(feature('Point', at(*point.place), **told))
+        about = {'name': point.name} | ({'time': point.time} if point.time else {}) | point.about
+        features.append(feature('Point', at(*point.place), **about))
     return json.dumps({'type': 'FeatureCollection', 'features': features}).encode()
 
 
@@ -185,9 +185,9 @@ def kml(chart: Chart) -> bytes:
     """A document with a placemark for each line and surfacing."""
 
     def shape(kind: str, rows: list[Row], is_deep: bool = False) -> ElementTree.Element:
-        told = (f'{x:.7f},{y:.7f},{-(depth or 0.0):.2f}' for y, x, depth, _ in rows)
+        places = (f'{x:.7f},{y:.7f},{-(depth or 0.0):.2f}' for y, x, depth, _ in rows)
         mode = _element('altitudeMode', 'absolute' if is_deep else 'clampToGround')
-        return _element(kind, mode, _element('coordinates', ' '.join(told)))
+        return _element(kind, mode, _element('coordinates', ' '.join(places)))
 
     marks = []
     for line in chart.all_lines:
@@ -208,8 +208,8 @@ def gpx(chart: Chart) -> bytes:
 
     def at(tag: str, row: Row, name: str = '') -> ElementTree.Element:
         depth = '' if row.depth_m is None else f'{-row.depth_m:.2f}'
-        told = {'ele': depth, 'time': row.time, 'name': name}
-        inside = [_element(key, text) for key, text in told.items() if text]
+        children = {'ele': depth, 'time': row.time, 'name': name}
+        inside = [_element(key, text) for key, text in children.items() if text]
         east = min(row.longitude, 179.9999999)  # less than 180, by its schema
         return _element(tag, *inside, lat=f'{row.latitude:.7f}', lon=f'{east:.7f}')
 

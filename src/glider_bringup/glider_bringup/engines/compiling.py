@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The loop of a law with a method that was never flown here is compiled, once; this is told."""
+"""The loop of a law with a method that was never flown here is compiled, once; this is shown."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from glider_base.errors import ConfigurationError
-from glider_base.kernel import compiling_told
+from glider_base.kernel import on_compiling
 from glider_base.signals import TICK_S
 from glider_base.slot import NOT_COMPILED, reason
 from glider_bringup.engines.direct import fly_held, hold
@@ -27,7 +27,7 @@ Tell = Callable[[str], Callable[[], None] | None]
 
 
 @contextmanager
-def told(combination: Combination, tell: Tell) -> Iterator[None]:
+def shown_once(combination: Combination, tell: Tell) -> Iterator[None]:
     """Tell what is compiled in the block, if anything is; what cannot be is refused."""
     law, method, navigation, breaks, steered = combination
     words = [f'law {law} with method {method}', f'position {navigation.replace("_", " ")}']
@@ -37,7 +37,7 @@ def told(combination: Combination, tell: Tell) -> Iterator[None]:
         words.append(f'vehicle {vehicle_path(steered).stem}')
     line = f'compiling the mathematics for {", ".join(words)}, once; up to half a minute'
     try:
-        with compiling_told(partial(tell, line)):
+        with on_compiling(partial(tell, line)):
             yield
     except NOT_COMPILED as error:
         raise ConfigurationError(
@@ -66,7 +66,7 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
                 changes['profile.depth_m'] = min(DEPTH_M, vehicle.rated_depth_m)
                 changes['profile.net_heaviness_kg'] = 0.5 * vehicle.params().m_b_max
             state, params = mission_of(load_scenario(changes=changes))
-            with told(one, tell):
+            with shown_once(one, tell):
                 fly_held(hold(state, params), nothing, TICK_S)
             if interrupts:
                 raise KeyboardInterrupt

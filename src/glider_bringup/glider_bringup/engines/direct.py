@@ -134,9 +134,9 @@ def fly_held(held, log, dt):
         control, controlled, limits = control_tick(control, t_s, seen, in_control, dt)
         condition = (measured.health, measured.battery, pressure, measured.altitude)
         heard = (controlled[0], guided[0], odom, joints, *condition)
-        guard, guarded, told = guard_tick(guard, t_s, heard, in_guard, dt)
+        guard, guarded, reported = guard_tick(guard, t_s, heard, in_guard, dt)
         plant = plant_move(plant, (guarded[0], water, guarded[1]), in_plant, dt)
-        said = (phase, stage, limits, told)
+        said = (phase, stage, limits, reported)
         put(log, row, 0, (*numbers, water, *believed, *guided, *controlled, *guarded, *said))
         rows = row + 1
         if finished:

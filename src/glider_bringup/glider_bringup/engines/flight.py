@@ -178,7 +178,7 @@ class Held:
             look = LOOK_TICKS - self.past.tick % LOOK_TICKS if self._pilot else math.inf
             ticks = int(min(len(log) - filled, alone, look))
             try:
-                flown, is_over = self._until_told(log[filled : filled + ticks])
+                flown, is_over = self._until_ordered(log[filled : filled + ticks])
             except FlightError:
                 if filled:  # it will be raised once more, of no rows
                     break
@@ -195,7 +195,7 @@ class Held:
             for one in (self, *self._hearers):
                 one.order(order)
 
-    def _until_told(self, log: np.ndarray) -> tuple[int, bool]:
+    def _until_ordered(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, but not beyond where an order waits for the surface, or is a reaction."""
         waits = wait_for_surface(self.past.waiting, self.past.tick)
         reacts = self._settings.no_progress != 'tell'

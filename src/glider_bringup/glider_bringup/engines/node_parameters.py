@@ -42,10 +42,10 @@ def node_parameters(
         nodes[GUARD.node]['pressure'] = False
     faults = defaultdict(list)
     for one in scenario.message_faults:
-        told = one.model_dump(include=set(MessageFault.model_fields))
-        faults[publisher(one.topic).node].append(told)
-    for name, told in faults.items():
-        nodes[name] |= {'message_faults': json.dumps(told), 'message_seed': scenario.seed}
+        own = one.model_dump(include=set(MessageFault.model_fields))
+        faults[publisher(one.topic).node].append(own)
+    for name, own in faults.items():
+        nodes[name] |= {'message_faults': json.dumps(own), 'message_seed': scenario.seed}
     nodes[topics.RECORDER] = {'name': scenario.name, 'topics': json.dumps(scenario.topics)}
     if record_to is not None:
         nodes[topics.RECORDER] |= {

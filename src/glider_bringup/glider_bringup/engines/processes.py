@@ -156,7 +156,7 @@ class _ForkServer(_Process):
         self, plan: Sequence[tuple[str, Sequence[str], int, int, int]], environment: dict[str, str]
     ) -> tuple[int, IO[bytes]]:
         """Start it with what `fork_server` wants to know; gives what it tells, and its output."""
-        told, says = os.pipe()
+        reader, says = os.pipe()
         parent = os.getpid()
         self._popen = subprocess.Popen(
             [sys.executable, '-m', 'glider_bringup.engines.fork_server', str(says)],
@@ -173,7 +173,7 @@ class _ForkServer(_Process):
         with suppress(BrokenPipeError):  # it is gone already, which is seen soon
             self._popen.stdin.write(json.dumps(plan).encode() + b'\n')
             self._popen.stdin.flush()
-        return told, self._popen.stdout
+        return reader, self._popen.stdout
 
     def look(self) -> bool:
         """Whether it is gone."""
@@ -244,10 +244,10 @@ class _Run:
             self._listen(error, partial(self._say, process))
             plan.append((name, list(command), out_end, error_end, int(last_signal)))
             ends += [out_end, error_end]
-        told, output = self._server.start(plan, environment)
+        reader, output = self._server.start(plan, environment)
         for end in ends:
             os.close(end)
-        self._listen(told, self._hear)
+        self._listen(reader, self._hear)
         self._listen(os.dup(output.fileno()), partial(self._say, self._server))
         output.close()
 

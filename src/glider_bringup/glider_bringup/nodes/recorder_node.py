@@ -187,10 +187,10 @@ class RecorderNode(TickNode):
 
     def on_count(self, array) -> None:
         """Learn how many events a node has told of; not from the node of a second glider."""
-        told = health.told_in(array)
-        report = self.reports.get(told.node.rpartition('/')[2]) if told else None
-        if told and (told.node == self.replay or (report and report.process == told.process)):
-            self.counted[told.node] = told
+        count = health.count_in(array)
+        report = self.reports.get(count.node.rpartition('/')[2]) if count else None
+        if count and (count.node == self.replay or (report and report.process == count.process)):
+            self.counted[count.node] = count
 
     def on_event(self, array) -> None:
         """Keep what happens to this glider; the end of a flight is kept by `on_report`."""
@@ -299,9 +299,9 @@ class RecorderNode(TickNode):
 
     def whole_ns(self) -> int:
         """Newest tick of which no event is under way any more: all who tell have counted them."""
-        for told in self.counted.values():
-            if self.heard[told.node] >= told.events:
-                self.settled_ns[told.node] = told.stamp_ns
+        for count in self.counted.values():
+            if self.heard[count.node] >= count.events:
+                self.settled_ns[count.node] = count.stamp_ns
         tellers = [self.replay] if self.is_replayed() else self.tellers
         return min(self.settled_ns.get(teller, -TICK_NS) for teller in tellers)
 

@@ -53,10 +53,10 @@ class FaultTimes:
 
     def result(self) -> list[dict]:
         """What ``score.json`` tells of each: when it began and ended (None: it did not), what."""
-        told = []
+        times = []
         for fault, began in zip(self._faults, self._began.tolist(), strict=True):
             end = began + fault.lasts
-            told.append(
+            times.append(
                 {
                     't_s': seconds(began) if began >= 0 else None,
                     'end_s': seconds(end) if 0 <= began and end < self._tick else None,
@@ -65,4 +65,4 @@ class FaultTimes:
                     'when': fault.when,
                 }
             )
-        return told
+        return times

@@ -132,15 +132,15 @@ class NavigationScorer:
 
     def result(self, method: str, believed_cross_track: dict) -> dict:
         """The part ``navigation`` of ``score.json``; a figure without data is None."""
-        told = self._surfacings
+        surfacings = self._surfacings
         errors, beside = (
-            np.array([one[name] for one in told]) for name in ('error_m', 'cross_track_m')
+            np.array([one[name] for one in surfacings]) for name in ('error_m', 'cross_track_m')
         )
-        within = [one['inside_95'] for one in told if one['inside_95'] is not None]
+        within = [one['inside_95'] for one in surfacings if one['inside_95'] is not None]
         ways, dac = np.array(self._ways), np.array(self._dac_errors)
         return {
             'method': method,
-            'surfacings': len(told),
+            'surfacings': len(surfacings),
             'error_m': {
                 'p50': _percentile(errors, 50),
                 'p95': _percentile(errors, 95),
@@ -148,7 +148,7 @@ class NavigationScorer:
             },
             'surfacing_cross_track_m': beside.tolist(),
             'surfacing_error_m': errors.tolist(),
-            'surfacing_t_s': [one['t_s'] for one in told],
+            'surfacing_t_s': [one['t_s'] for one in surfacings],
             'under_water_rms_m': ways.tolist(),
             'from_fourth': {
                 'surfacing_cross_track_m': largest(beside[FOURTH:]),
@@ -159,7 +159,7 @@ class NavigationScorer:
             'ellipse_95_share': _mean(within),
             'fixed': len(self._innovations),
             'innovation_squared': _mean(self._innovations),
-            'reports': told if self._reckons else [],
+            'reports': surfacings if self._reckons else [],
         }
 
 

@@ -34,7 +34,7 @@ SAME_M = 0.01
 TRIES_S, CLIMBS_M = 600.0, 5.0
 
 
-def as_told(bits: np.ndarray) -> np.ndarray:
+def as_reported(bits: np.ndarray) -> np.ndarray:
     """Bits of guard or control as they are told, which is once a second at most, int64[ticks].
 
     The same from a bag, which has what was told, and from a log, which has what was noticed.
@@ -45,17 +45,21 @@ def as_told(bits: np.ndarray) -> np.ndarray:
     return np.repeat([0, *bits[ticks]], np.diff([0, *ticks, len(bits)]))
 
 
-def ends_mission(told: np.ndarray) -> np.ndarray:
+def ends_mission(reported: np.ndarray) -> np.ndarray:
     """Where the guard brings the vehicle to the surface for good, bool[n]."""
-    return (told & (SURFACES | DROPS)) != 0
+    return (reported & (SURFACES | DROPS)) != 0
 
 
 def outcome_of(
-    depth: np.ndarray, told: np.ndarray, hull: tuple[float, float], infeasible: bool, missing: str
+    depth: np.ndarray,
+    reported: np.ndarray,
+    hull: tuple[float, float],
+    infeasible: bool,
+    missing: str,
 ) -> tuple[str, str]:
     """What became of a vehicle: its status, and the reason, empty where there is nothing to say.
 
-    By its true depth (m), float64[ticks], what the guard ``told``, int64[ticks] (see `as_told`),
+    By its true depth (m), float64[ticks], what the guard ``reported`` (see `as_reported`),
     the depths that its hull is rated for and at which it gives way (m, infinite if nobody knows),
     whether the course could not be held, and what of its mission it has not flown in its time.
     """
@@ -65,11 +69,11 @@ def outcome_of(
     deepest_m, end_m = float(np.max(depth)), float(depth[-1])
     if deepest_m > crush_m:
         return LOST, _beyond(depth, crush_m, 'its hull bears')
-    is_ended = ends_mission(told[-1:])[0]
-    reasons = [_ended(told) if is_ended else missing]
+    is_ended = ends_mission(reported[-1:])[0]
+    reasons = [_ended(reported) if is_ended else missing]
     if (is_ended or missing) and end_m > AFLOAT_M:
         reasons.append(f'{end_m:,.0f} m deep at the end')
-        if is_ended and _nothing_is_left(depth, told):
+        if is_ended and _nothing_is_left(depth, reported):
             return LOST, f'{"; ".join(reasons)}, and nothing left to try'
     if deepest_m > rated_m + LIMITS.margin_m(rated_m):
         reasons.append(_beyond(depth, rated_m, 'it is rated for'))
@@ -191,20 +195,20 @@ class BottomWatch:
         return {'touched': tick is not None, 't_s': at_s, 'least_height_m': self._least_m}
 
 
-def _ended(told: np.ndarray) -> str:
+def _ended(reported: np.ndarray) -> str:
     """When the guard ended the mission for good, and why."""
-    free = np.flatnonzero(~ends_mission(told))
+    free = np.flatnonzero(~ends_mission(reported))
     tick = int(free[-1]) + 1 if len(free) else 0
-    rows = [row for row in ROWS if told[tick] & row.bit & (SURFACES | DROPS)]
+    rows = [row for row in ROWS if reported[tick] & row.bit & (SURFACES | DROPS)]
     why = '; '.join(row.says for row in rows)
     return f'the guard ended the mission at {tick * TICK_S:,.1f} s: {why}'
 
 
-def _nothing_is_left(depth: np.ndarray, told: np.ndarray) -> bool:
+def _nothing_is_left(depth: np.ndarray, reported: np.ndarray) -> bool:
     """Whether all has been done for long, and the vehicle has not come up."""
     ticks = math.ceil(TRIES_S / TICK_S)
     return (
         len(depth) > ticks
-        and bool(np.all(told[-ticks:] & DROPS))
+        and bool(np.all(reported[-ticks:] & DROPS))
         and depth[-ticks] - depth[-1] < CLIMBS_M
     )

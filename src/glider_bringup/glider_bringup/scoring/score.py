@@ -34,12 +34,12 @@ from glider_bringup.scoring.outcome import (
     INFEASIBLE,
     BottomWatch,
     arrival_of,
-    as_told,
+    as_reported,
     ends_mission,
     outcome_of,
 )
 from glider_bringup.scoring.scores import Flown, measured, seconds
-from glider_bringup.scoring.true_motion import TrueMotion, jumps, told_course
+from glider_bringup.scoring.true_motion import TrueMotion, course_at, jumps
 from glider_control.intake import REFUSED
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
 from glider_guidance.block import say_no_progress
@@ -83,7 +83,7 @@ _TARGET = slice(_FIRST_REFERENCE, _FIRST_REFERENCE + 2)
 
 
 @kernel
-def _series_of(log, told):
+def _series_of(log, given):
     """`_SERIES` of log rows with the true motion, and as they were told, float64[16, n]."""
     series = np.empty((len(_SERIES), len(log)))
     for k in range(len(log)):
@@ -95,7 +95,7 @@ def _series_of(log, told):
             heading_of(x.q_w, x.q_x, x.q_y, x.q_z),
         )
         theta = pitch_of(wanted.q_w, wanted.q_x, wanted.q_y, wanted.q_z)
-        motion = (x.p_d, row[_E2], told[k, _E2], pitch, theta, heading)
+        motion = (x.p_d, row[_E2], given[k, _E2], pitch, theta, heading)
         asked = (wanted.w, wanted.p_n, wanted.p_e, row[_INFEASIBLE])
         bits = (row[_GUARD], float(int(row[_SATURATION]) | int(row[_GUARD])))
         values = motion + asked + bits + (joints[0], joints[1], joints[2], joints[3])
@@ -148,14 +148,14 @@ class Scorer:
         """Take in a block of log rows, float64[n, ROW]; nothing of it is kept by reference."""
         if not len(log):
             return
-        told, log = log, self._truth.of(log)
+        given, log = log, self._truth.of(log)
         if self._readings:
             log = log.copy()
             _take_off_noise(log, self.ticks, self._readings)
-        self._navigation.add(told, log)
+        self._navigation.add(given, log)
         self._faults.add(log)
         self._energy.add(log)
-        self._blocks.append(_series_of(log, told))
+        self._blocks.append(_series_of(log, given))
         if self._bottom:
             self._bottom.add(*np.ascontiguousarray(poses_from_wire(log[:, _ODOM])[:, :3].T))
         if self._first is None:
@@ -163,7 +163,7 @@ class Scorer:
         for row in jumps(log[:, _TARGET], self._last[_TARGET]).tolist():
             before = (log[row - 1] if row else self._last).copy()
             tick = self.ticks - len(log) + row
-            self._reroutes.append((tick, before, log[row].copy(), told_course(told[row])))
+            self._reroutes.append((tick, before, log[row].copy(), course_at(given[row])))
         self._look_for_end(log)
         no_progress = log[:, COLUMNS['no_progress']]
         for row in begins(no_progress, self._last[COLUMNS['no_progress']]).tolist():
@@ -210,8 +210,8 @@ class Scorer:
             that was flown to its end. A figure without data is None.
         """
         series, ticks = self._series, self.ticks
-        depth, told = series('depth'), as_told(series('guard').astype(np.int64) & ALL)
-        flies = ~ends_mission(told) & ~(np.maximum.accumulate(depth) > self._hull[1])
+        depth, reported = series('depth'), as_reported(series('guard').astype(np.int64) & ALL)
+        flies = ~ends_mission(reported) & ~(np.maximum.accumulate(depth) > self._hull[1])
         steady, scored = windows(depth, series('rate_ref') > 0.0, rules, TICK_S)
         steady &= flies
         heading, has_whole_mean = _heading_fluctuation_deg(series('heading'))
@@ -233,7 +233,7 @@ class Scorer:
         arrival = self._arrival(rules)
         ended = self._end is not None
         missing = _missing(depth, dives, time_s, ended, arrival['arrival'], rules)
-        status, reason = outcome_of(depth, told, self._hull, infeasible, missing)
+        status, reason = outcome_of(depth, reported, self._hull, infeasible, missing)
         pace_m = way_m if status in (COMPLETED, INFEASIBLE) else None
         return {
             'status': status,
@@ -341,11 +341,11 @@ def _guard(mask: np.ndarray, has_weight: bool) -> dict:
     gravest = DROP if has_weight else SURFACE
     rows = {row.bit: (row.name, REACTIONS[min(row.reaction, gravest)], row.says) for row in ROWS}
     rows[REFUSED] = ('measurement_refused', REACTIONS[NOTE], REFUSED_SAYS)
-    told = as_told(mask.astype(np.int64) & (ALL | REFUSED))
+    reported = as_reported(mask.astype(np.int64) & (ALL | REFUSED))
     events, before = [], 0
-    for tick in np.flatnonzero(np.diff(told, prepend=0)).tolist():
-        new = int(told[tick]) & ~before
-        before = int(told[tick])
+    for tick in np.flatnonzero(np.diff(reported, prepend=0)).tolist():
+        new = int(reported[tick]) & ~before
+        before = int(reported[tick])
         events += [
             {'t_s': seconds(tick), 'row': row, 'reaction': reaction, 'message': says}
             for bit, (row, reaction, says) in rows.items()

@@ -72,8 +72,8 @@ def studied() -> list[tuple[str, str]]:
 
 def reckoned(card: dict) -> dict | None:
     """What a card tells of navigation, where the vehicle had to reckon its place; else None."""
-    told = card.get('navigation') or {'method': 'known'}
-    return None if told['method'] == 'known' else told
+    navigation = card.get('navigation') or {'method': 'known'}
+    return None if navigation['method'] == 'known' else navigation
 
 
 def seconds(ticks: int) -> float:
@@ -150,7 +150,7 @@ SCORES = [
 # fmt: on
 
 
-def told_in(cards: list[dict[str, Any]]) -> list[Score]:
+def scores_in(cards: list[dict[str, Any]]) -> list[Score]:
     """Scores of some cards, with the travel of their steering surfaces, which have any name."""
     keys = [score.key for score in SCORES]
     names = sorted({name for card in cards for name in card['actuator_travel']})

@@ -365,11 +365,11 @@ def _place(log: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
-def _samples(log: np.ndarray, told: np.ndarray | None) -> np.ndarray:
-    """What is sampled of log rows, float64[n, len(SAMPLES)]; ``told`` tells the believed place."""
+def _samples(log: np.ndarray, given: np.ndarray | None) -> np.ndarray:
+    """What is sampled of log rows, float64[n, len(SAMPLES)]; ``given`` has the estimated place."""
     position, target = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
     current = log[:, COLUMNS['current_velocity']] / KNOT_MPS
-    believed = np.full((len(log), 2), np.nan) if told is None else told[:, COLUMNS['odom']]
+    believed = np.full((len(log), 2), np.nan) if given is None else given[:, COLUMNS['odom']]
     return np.stack(
         (
             *(position[:, 1], position[:, 0], -position[:, 2]),

@@ -37,7 +37,7 @@ def jumps(target: np.ndarray, before: np.ndarray) -> np.ndarray:
     return np.flatnonzero(is_jump)
 
 
-def told_course(row: np.ndarray) -> float | None:
+def course_at(row: np.ndarray) -> float | None:
     """Course of the path (rad) by what guidance tells in a row; None of who is on its target."""
     east, north = row[[_ODOM_START, _ODOM_START + 1]] - row[[_EAST, _NORTH]]
     if math.hypot(east, north) <= _AWAY_M:
@@ -95,10 +95,10 @@ class TrueMotion:
         moves = np.any(way != 0.0, axis=1) & ~begins
         course = np.arctan2(way[:, 0], way[:, 1])
         for row in np.flatnonzero(begins).tolist():
-            told, after = told_course(log[row]), np.flatnonzero(moves[row:])
-            if told is None:
-                told = course[row + after[0]] if len(after) else self._course
-            course[row] = told
+            there, after = course_at(log[row]), np.flatnonzero(moves[row:])
+            if there is None:
+                there = course[row + after[0]] if len(after) else self._course
+            course[row] = there
         last = np.maximum.accumulate(np.where(moves | begins, np.arange(len(way)), -1))
         course = np.where(last < 0, self._course, course[last])
         self._target, self._course = target[-1], float(course[-1])

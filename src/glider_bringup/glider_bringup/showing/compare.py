@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 from glider_base.settings import ConfigurationError, leaves
 from glider_bringup.scoring.card import STOPPED
-from glider_bringup.scoring.scores import Score, reckoned, told_in
+from glider_bringup.scoring.scores import Score, reckoned, scores_in
 from glider_bringup.showing.panels import ACTUATORS, FLOWN, SPACE, SURFACE, flown_panel
 from glider_bringup.showing.scorecard import engine_text, event_texts, flown_text, show
 from glider_bringup.showing.web_page import Curve, FlownRun, Panel, make_page
 from glider_bringup.showing.words import small, span
-from glider_mission.changes import told_fields
+from glider_mission.changes import fields_text
 
 #: Captions of the panels of curves that are laid over each other.
 _OVERLAID = {
@@ -138,27 +138,27 @@ def _cells(score: Score, cards: list[dict[str, Any]]) -> list[Cell]:
 def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
     """Lines of scorecards side by side: name, then a cell of each run."""
 
-    def told(name: str, say) -> tuple[str, list[Cell]]:
+    def line(name: str, say) -> tuple[str, list[Cell]]:
         return name, [Cell(say(card)) for card in cards]
 
     rows = [
-        told('status', lambda card: ': '.join(filter(None, (card['status'], card['reason'])))),
-        told('flown', flown_text),
-        told('engine', engine_text),
+        line('status', lambda card: ': '.join(filter(None, (card['status'], card['reason'])))),
+        line('flown', flown_text),
+        line('engine', engine_text),
     ]
     if any(card.get('changed') for card in cards):
         rows.append(
-            told('changed', lambda card: told_fields(card.get('changed', {})) or 'nothing')
+            line('changed', lambda card: fields_text(card.get('changed', {})) or 'nothing')
         )
     if any(map(reckoned, cards)):
         rows.append(
-            told('navigation', lambda card: (reckoned(card) or {'method': 'known'})['method'])
+            line('navigation', lambda card: (reckoned(card) or {'method': 'known'})['method'])
         )
     if any(event_texts(card, 'guard') for card in cards):
-        rows.append(told('guard', lambda card: '; '.join(event_texts(card, 'guard')) or 'nothing'))
+        rows.append(line('guard', lambda card: '; '.join(event_texts(card, 'guard')) or 'nothing'))
     return rows + [
         (score.label, _cells(score, cards))
-        for score in told_in(cards)
+        for score in scores_in(cards)
         if any(score.in_card(card) is not None for card in cards)
     ]
 

@@ -100,16 +100,16 @@ def lost_since_s(traces: Traces) -> float | None:
     return float(deep[first]) * traces.spacing_s if first < len(deep) else None
 
 
-def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
+def navigation_notes(part: dict[str, Any], learns: bool) -> list[str]:
     """How well a vehicle knew where it was that reckons its place, in sentences.
 
     By part ``navigation`` of a scorecard; it ``learns`` where it believes in a current.
     """
-    off = [abs(value) for value in told['surfacing_cross_track_m']]
+    off = [abs(value) for value in part['surfacing_cross_track_m']]
     if not off:
         return ['It came up from no dive, so its estimated position was never put to the proof.']
     notes = [_came_up(off, learns)]
-    error = told['error_m']
+    error = part['error_m']
     worst = small(error['worst'])
     if len(off) == 1:
         notes.append(f'It came up {worst} off its estimated position.')
@@ -119,8 +119,8 @@ def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
     else:
         text = f'It surfaced off its estimated position by {small(error["p50"])} (median)'
         notes.append(f'{text}, by {worst} at worst.')
-    if told['ellipse_95_share'] is not None:
-        inside = round(told['ellipse_95_share'] * len(off))
+    if part['ellipse_95_share'] is not None:
+        inside = round(part['ellipse_95_share'] * len(off))
         text = f'The 95 % ellipses hold {inside} of {len(off)} true places'
         if len(off) == 1:
             text = f'Its 95 % ellipse {"holds" if inside else "does not hold"} the true place'
@@ -130,9 +130,9 @@ def navigation_notes(told: dict[str, Any], learns: bool) -> list[str]:
         )
         too_sure = ': its ellipses are too small' if chance < UNLIKELY else ''
         notes.append(f'{text}{too_sure}.')
-    if told['dac_error_mps']['rms'] is not None:
+    if part['dac_error_mps']['rms'] is not None:
         kinds = ('rms', 'worst')
-        rms, worst = (f'{told["dac_error_mps"][name] / KNOT_MPS:.3f} kn' for name in kinds)
+        rms, worst = (f'{part["dac_error_mps"][name] / KNOT_MPS:.3f} kn' for name in kinds)
         off_by = rms if rms == worst else f'{rms} (rms), {worst} at worst'
         text = 'The depth-averaged current that it estimated after its fixes was off by'
         notes.append(f'{text} {off_by}.')
@@ -189,11 +189,11 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
         text = f'{percent:.0f}' if percent >= 10.0 else f'{percent:.2g}'
         return f'{span(ticks * TICK_S)} ({text} % of the time)'
 
-    told = reckoned(card)
+    navigation = reckoned(card)
     problems, notes = _how_bad(card, traces), []
     problems += [f'{text[0].upper()}{text[1:]}.' for text in run.unsteered]
-    if told:
-        notes += navigation_notes(told, run.scenario.navigation.current != 'none')
+    if navigation:
+        notes += navigation_notes(navigation, run.scenario.navigation.current != 'none')
     notes += [f'Broken on purpose: {text}.' for text in fault_texts(card)]
     problems += [f'The guard, {text}.' for text in event_texts(card, 'guard')]
     problems += [f'Guidance, {text}.' for text in event_texts(card, 'no_progress')]

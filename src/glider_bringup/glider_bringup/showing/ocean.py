@@ -13,13 +13,13 @@ from glider_base.frames import on_chart, within_180
 from glider_base.settings import ConfigurationError
 from glider_bringup.showing.figure import GREEN, ORANGE, new_figure
 from glider_bringup.showing.words import count
-from glider_mission.chart import place_told
+from glider_mission.chart import place_text
 from glider_mission.disk import save_figure
 from glider_mission.routing.plan import Plan
-from glider_mission.scenario import Scenario, check_ways, load_scenario, told_of
+from glider_mission.scenario import Scenario, check_ways, load_scenario, named_in
 from glider_model.ocean.bottom import BathymetrySettings
 from glider_model.ocean.fields.grid import GridSettings
-from glider_model.ocean.grid_file import GRIDS, Loaded, Part, contents, told_time
+from glider_model.ocean.grid_file import GRIDS, Loaded, Part, contents, time_text
 from glider_model.ocean.water import ModelWaterSettings
 
 #: Arrows along either side of a chart.
@@ -62,17 +62,17 @@ def look(file: Path) -> tuple[dict[str, Any], Sea]:
         found = contents(file)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
-    told = {
+    listing = {
         'file': str(file),
         'source': found.source,
         **dict.fromkeys(GRIDS),
-        **{name: _told(name, part) for name, part in found.parts.items()},
+        **{name: _listed(name, part) for name, part in found.parts.items()},
         'refused': found.refused,
         'mission': None,
     }
     seen = {name: part.seen for name, part in found.parts.items() if part.seen}
     panels = [panel for name, one in seen.items() for panel in _panels(name, _uppermost(one))]
-    return told, Sea(file.name, panels, None)
+    return listing, Sea(file.name, panels, None)
 
 
 def _uppermost(seen: Loaded) -> Loaded:
@@ -81,51 +81,51 @@ def _uppermost(seen: Loaded) -> Loaded:
     return seen._replace(axes=axes, water=seen.water[:, :1])
 
 
-def _told(name: str, part: Part) -> dict[str, Any]:
+def _listed(name: str, part: Part) -> dict[str, Any]:
     """What a part of a file is, how far it goes, and the range of its numbers."""
     variables = [{**one, 'low': None, 'high': None} for one in part.variables]
-    told = {'variables': variables, **_extent(part.axes), 'seen': None, 'land_share': None}
+    listed = {'variables': variables, **_extent(part.axes), 'seen': None, 'land_share': None}
     if name == 'currents':
-        told['speed_mps'] = None
+        listed['speed_mps'] = None
     if part.seen is None:  # too large to look at as a whole
-        return told
+        return listed
     axes, water, _, land = part.seen
     numbers = list(np.moveaxis(water[0][:, ~land], -1, 0))
     if 'time' in part.axes:
         depth = {'first': axes.depths[0], 'last': axes.depths[-1]}
-        told['seen'] = {'time': told_time(axes.times[0]), 'depth_m': depth}
-    told['land_share'] = float(land.mean())
+        listed['seen'] = {'time': time_text(axes.times[0]), 'depth_m': depth}
+    listed['land_share'] = float(land.mean())
     if not land.all():
         for one, values in zip(variables, numbers, strict=True):
             one |= {'low': float(values.min()), 'high': float(values.max())}
         if name == 'currents':
             speed = np.hypot(*(values[0] for values in numbers))
             rms = math.sqrt(float(np.mean(speed**2)))
-            told['speed_mps'] = {'rms': rms, 'max': float(speed.max())}
-    return told
+            listed['speed_mps'] = {'rms': rms, 'max': float(speed.max())}
+    return listed
 
 
 def _extent(axes: dict[str, np.ndarray]) -> dict[str, Any]:
     """How far the axes of a part go."""
     names = {'depth': 'depth_m', 'latitude': 'latitude_deg', 'longitude': 'longitude_deg'}
-    told = {
+    extent = {
         names[axis]: {'first': one[0], 'last': one[-1], 'count': len(one)}
         for axis, one in axes.items()
         if axis in names
     }
     times = axes.get('time')
     if times is None:
-        return told
+        return extent
     step = float(np.median(np.diff(times))) / 3600.0 if len(times) > 1 else None
-    ends = {'first': told_time(times[0]), 'last': told_time(times[-1])}
-    return {'times': {**ends, 'count': len(times), 'step_h': step}, **told}
+    ends = {'first': time_text(times[0]), 'last': time_text(times[-1])}
+    return {'times': {**ends, 'count': len(times), 'step_h': step}, **extent}
 
 
-def in_words(told: dict[str, Any]) -> list[tuple[str, str]]:
+def in_words(listing: dict[str, Any]) -> list[tuple[str, str]]:
     """Name and text of each line of what is in a file."""
-    rows, before = [('source', told['source'] or '-')], []
+    rows, before = [('source', listing['source'] or '-')], []
     for name in GRIDS:
-        part = told[name]
+        part = listing[name]
         if not part:
             continue
         for one in part['variables']:
@@ -140,11 +140,11 @@ def in_words(told: dict[str, Any]) -> list[tuple[str, str]]:
         where = _where(part)
         rows += [row for row in where if row not in before]
         before = where
-    rows += [(name, f'cannot be used: {reason}') for name, reason in told['refused'].items()]
-    if told['mission']:
-        used = ', '.join(name for name in GRIDS if told[name])
-        covered = f'is covered by {used}' if told['mission']['covered'] else 'is not covered'
-        rows.append(('mission', f'{told["mission"]["scenario"]} {covered}'))
+    rows += [(name, f'cannot be used: {reason}') for name, reason in listing['refused'].items()]
+    if listing['mission']:
+        used = ', '.join(name for name in GRIDS if listing[name])
+        covered = f'is covered by {used}' if listing['mission']['covered'] else 'is not covered'
+        rows.append(('mission', f'{listing["mission"]["scenario"]} {covered}'))
     return rows
 
 
@@ -164,7 +164,7 @@ def _where(part: dict[str, Any]) -> list[tuple[str, str]]:
         text = f'{part["seen"]["time"]}, {depth["first"]:g} to {depth["last"]:g} m'
         rows.append(('ranges are of', text))
     south, north = part['latitude_deg'], part['longitude_deg']
-    corners = [place_told(south[k], within_180(north[k])) for k in ('first', 'last')]
+    corners = [place_text(south[k], within_180(north[k])) for k in ('first', 'last')]
     rows.append(('places', f'{corners[0]} to {corners[1]}, {south["count"]} x {north["count"]}'))
     if part['land_share'] is not None:
         of = 'the uppermost level' if 'times' in part else 'the chart'
@@ -172,19 +172,19 @@ def _where(part: dict[str, Any]) -> list[tuple[str, str]]:
     return rows
 
 
-def mission_in(told: dict[str, Any], name: str) -> Sea:
+def mission_in(listing: dict[str, Any], name: str) -> Sea:
     """What a mission meets at its start, if it flies in the water and over the bottom of a file.
 
     Raises ConfigurationError if the file does not cover it, and why.
     """
-    file = Path(told['file']).resolve()
+    file = Path(listing['file']).resolve()
     scenario = load_scenario(name, _NO_FILES)
     mission, panels = scenario.mission(), []
-    with told_of('', ValueError):
+    with named_in('', ValueError):
         for kind in (GridSettings, ModelWaterSettings, BathymetrySettings):
-            if told[part := kind.of]:
+            if listing[part := kind.of]:
                 grid = kind(file=str(file)).resolved(mission)
-                check_ways(scenario, grid, part == 'bottom' or not told['bottom'])
+                check_ways(scenario, grid, part == 'bottom' or not listing['bottom'])
                 loaded, begin = grid.loaded()
                 step = np.searchsorted(loaded.axes.times, begin, side='right') - 1
                 axes = loaded.axes._replace(times=loaded.axes.times[step:])
@@ -198,12 +198,12 @@ def _panels(name: str, seen: Loaded) -> list[Panel]:
     if name == 'bottom':
         depth = np.where(seen.land, np.nan, seen.water[0, 0, ..., 0])
         return [Panel('bottom', 'depth of the bottom (m)', 'Blues', *places, depth)]
-    at = f'at {levels[0]:g} m, {told_time(time)}'
+    at = f'at {levels[0]:g} m, {time_text(time)}'
     if name == 'currents':
         mean, title = seen.water[0, 0], f'current {at}'
         if len(levels) > 1:
             mean = trapezoid(seen.water[0], levels, axis=0) / (levels[-1] - levels[0])
-            title = f'mean current, {levels[0]:g} to {levels[-1]:g} m, {told_time(time)}'
+            title = f'mean current, {levels[0]:g} to {levels[-1]:g} m, {time_text(time)}'
         arrows = tuple(np.where(seen.land, np.nan, mean[..., k]) for k in (0, 1))
         return [Panel(title, 'speed (m/s)', 'Blues', *places, np.hypot(*arrows), arrows)]
     water = np.where(seen.land, np.nan, np.moveaxis(seen.water[0, 0], -1, 0))

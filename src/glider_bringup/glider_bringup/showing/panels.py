@@ -145,10 +145,10 @@ def _desired(name: str, label: str = 'desired') -> Curve:
 
 def _flight_panels(run: FlownRun) -> list[Panel]:
     noisy = run.traces.has('measured_depth_m')
-    told = 'estimated' if reckoned(run.card) else 'measured, with noise'
+    source = 'estimated' if reckoned(run.card) else 'measured, with noise'
 
     def curves(name: str, *others: Curve) -> tuple[Curve, ...]:
-        measured = (Curve(f'measured_{name}', told, 'faint'),) if noisy else ()
+        measured = (Curve(f'measured_{name}', source, 'faint'),) if noisy else ()
         return (*measured, Curve(name, 'true' if noisy else 'flown', 'measured'), *others)
 
     follows_path = run.scenario.profile.mode == 'path'
@@ -190,8 +190,8 @@ def _flight_panels(run: FlownRun) -> list[Panel]:
 
 def _navigation_panels(run: FlownRun) -> list[Panel]:
     """Where the vehicle was, and where it believed to be; nothing of one that knows its place."""
-    told = reckoned(run.card)
-    if told is None:
+    navigation = reckoned(run.card)
+    if navigation is None:
         return []
     believed = _desired('measured_cross_track_m', 'estimated')
     return [
@@ -221,7 +221,7 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
             surfacings=0,
             log=True,
         ),
-        *(_mean_current_panel(told.get('reports', []), i) for i in (0, 1)),
+        *(_mean_current_panel(navigation.get('reports', []), i) for i in (0, 1)),
     ]
 
 
@@ -286,14 +286,14 @@ def _current_panels(run: FlownRun) -> list[Panel]:
 def _learnt_panels(run: FlownRun) -> list[Panel]:
     """What the adaptive law has learnt; nothing of what stayed zero."""
     panels = []
-    for *told, names in _LEARNT:
+    for *shown, names in _LEARNT:
         curves = []
         for name in names:
             if run.traces.largest(name) > 0.0:
                 label = name.removesuffix('_nm').removesuffix('_radps').replace('_', ' ')
                 curves.append(Curve(name, label, _ROLES[len(curves)]))
         if curves:
-            panels.append(Panel(*told, tuple(curves), log='lyapunov_1' in names))
+            panels.append(Panel(*shown, tuple(curves), log='lyapunov_1' in names))
     return panels
 
 

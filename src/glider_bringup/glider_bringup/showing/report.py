@@ -17,7 +17,7 @@ from glider_bringup.showing.panels import report_panels
 from glider_bringup.showing.scorecard import card_rows, show, title_of
 from glider_bringup.showing.web_page import FlownRun, make_page
 from glider_bringup.showing.words import count, span, way
-from glider_mission.chart import place_told
+from glider_mission.chart import place_text
 from glider_model.ocean.current_settings import KNOT_MPS
 
 #: Marks of what became of a run, by the colour of that word; of others another one.
@@ -60,8 +60,8 @@ def _what_was_set(run: FlownRun) -> str:
 
     So are those of the vehicle that are not as in its file.
     """
-    told = {'name', 'vehicle', 'description', 'changed'}
-    values = run.scenario.model_dump(mode='json', exclude_defaults=True, exclude=told)
+    said_elsewhere = {'name', 'vehicle', 'description', 'changed'}
+    values = run.scenario.model_dump(mode='json', exclude_defaults=True, exclude=said_elsewhere)
     named = {'name': run.scenario.name, 'vehicle': run.card['vehicle']}
     changed = {f'vehicle.{field}': value for field, value in run.vehicle.changed().items()}
     return yaml_text({**named, **changed, **values})
@@ -104,7 +104,7 @@ def _surfacing(origin: Origin | None) -> dict[str, Callable[[dict], str]]:
     unit = ', N / E (m)' if origin is None else ''
 
     def place(ned_m: list[float]) -> str:
-        return place_told(*to_geodetic(*ned_m, origin)) if origin else _pair(ned_m, 0)
+        return place_text(*to_geodetic(*ned_m, origin)) if origin else _pair(ned_m, 0)
 
     return {
         'time': lambda one: span(one['t_s']),

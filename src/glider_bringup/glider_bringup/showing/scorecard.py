@@ -13,10 +13,10 @@ from rich.table import Table
 
 from glider_bringup.console import messages, output
 from glider_bringup.scoring.card import STATUSES, STOPPED
-from glider_bringup.scoring.scores import SCORES, Score, reckoned, told_in
+from glider_bringup.scoring.scores import SCORES, Score, reckoned, scores_in
 from glider_bringup.showing.words import span, way
-from glider_mission.changes import told_fields
-from glider_mission.chart import place_told
+from glider_mission.changes import fields_text
+from glider_mission.chart import place_text
 from glider_model.ocean.current_settings import KNOT_MPS
 
 
@@ -27,17 +27,17 @@ def show(value: float | None, unit: str, digits: int = 2) -> str:
 
 def _navigation_rows(card: dict) -> list[tuple[str, str]]:
     """Lines of how well a vehicle that reckons its place knew it."""
-    told = reckoned(card)
-    if told is None:
+    part = reckoned(card)
+    if part is None:
         return []
-    error, dac = told['error_m'], told['dac_error_mps']
-    off, believed = told['surfacing_cross_track_m'], told['believed_cross_track_m']
-    within, surfacings = told['ellipse_95_share'], told['surfacings']
+    error, dac = part['error_m'], part['dac_error_mps']
+    off, believed = part['surfacing_cross_track_m'], part['believed_cross_track_m']
+    within, surfacings = part['ellipse_95_share'], part['surfacings']
     rms, worst = (None if dac[name] is None else dac[name] / KNOT_MPS for name in ('rms', 'worst'))
     times = f'{surfacings} surfacing' + 's' * (surfacings != 1)
     inside = '-' if within is None else f'{round(within * surfacings)} of {surfacings} true places'
     return [
-        ('navigation', f'{told["method"]}, {times}, {told["fixed"]} with a fix'),
+        ('navigation', f'{part["method"]}, {times}, {part["fixed"]} with a fix'),
         ('surfacing position error', f'off by {show(error["p50"], "m", 1)} (p50), '
          f'{show(error["p95"], "m", 1)} (p95), {show(error["worst"], "m", 1)} (worst)'),
         ('cross-track, surfacing', f'max {show(max(map(abs, off), default=None), "m", 1)}, last '
@@ -63,8 +63,8 @@ def card_rows(card: dict) -> list[tuple[str, str]]:
         ('engine', engine_text(card)),
     ]
     for group, scores in groupby(SCORES, key=attrgetter('group')):
-        told = _IN_WORDS.get(group)
-        rows += told(card) if told else _score_rows(card, scores)
+        say = _IN_WORDS.get(group)
+        rows += say(card) if say else _score_rows(card, scores)
     return rows
 
 
@@ -104,46 +104,46 @@ def _end_rows(card: dict) -> list[tuple[str, str]]:
 
 def bottom_text(card: dict) -> str:
     """Whether it touched the bottom, or how near it came; empty where there is none."""
-    told = card.get('bottom')
-    if not told:
+    part = card.get('bottom')
+    if not part:
         return ''
-    if told['touched']:
-        return f'touched at {show(told["t_s"], "s", 1)}'
-    return f'cleared by {show(told["least_height_m"], "m", 1)} or more'
+    if part['touched']:
+        return f'touched at {show(part["t_s"], "s", 1)}'
+    return f'cleared by {show(part["least_height_m"], "m", 1)} or more'
 
 
 def arrival_text(card: dict) -> str:
     """Whether and when it came to the end of its path; empty where that is not its end."""
-    told = card.get('arrival')
-    if not told:
+    part = card.get('arrival')
+    if not part:
         return ''
-    place = told['place_latlon_deg']
-    where = f', at {place_told(*place)}' if place else ''
-    if told['arrived']:
-        missed = show(told['missed_m'], 'm', 1)
-        return f'came up {missed} from its last point after {span(told["t_s"])}{where}'
-    text = f'did not arrive in {span(card["sim_time_s"])}: {way(told["left_m"])} left{where}'
-    more_s = None if told['eta_s'] is None else told['eta_s'] - card['sim_time_s']
+    place = part['place_latlon_deg']
+    where = f', at {place_text(*place)}' if place else ''
+    if part['arrived']:
+        missed = show(part['missed_m'], 'm', 1)
+        return f'came up {missed} from its last point after {span(part["t_s"])}{where}'
+    text = f'did not arrive in {span(card["sim_time_s"])}: {way(part["left_m"])} left{where}'
+    more_s = None if part['eta_s'] is None else part['eta_s'] - card['sim_time_s']
     return text + ('' if more_s is None else f'; at its pace {span(more_s)} more')
 
 
 def _energy_rows(card: dict) -> list[tuple[str, str]]:
     """Lines of what was taken out of the battery."""
-    told = card.get('energy') or {'wh': None}
-    if not told['wh']:
+    part = card.get('energy') or {'wh': None}
+    if not part['wh']:
         return []
-    by = ', '.join(f'{name} {show(told["by"][name], "", 1)}' for name in told['by'])
-    a_dive = f'; {show(told["wh_per_dive"], "Wh", 1)} a dive' if told['wh_per_dive'] else ''
-    rows = [('energy', f'{show(told["wh"], "Wh", 1)}: {by}{a_dive}')]
-    if told['endurance_days'] is not None:  # else the mission ended: nothing goes on so
-        lasts, far = show(told['endurance_days'], 'days', 1), show(told['range_km'], 'km', 0)
+    by = ', '.join(f'{name} {show(part["by"][name], "", 1)}' for name in part['by'])
+    a_dive = f'; {show(part["wh_per_dive"], "Wh", 1)} a dive' if part['wh_per_dive'] else ''
+    rows = [('energy', f'{show(part["wh"], "Wh", 1)}: {by}{a_dive}')]
+    if part['endurance_days'] is not None:  # else the mission ended: nothing goes on so
+        lasts, far = show(part['endurance_days'], 'days', 1), show(part['range_km'], 'km', 0)
         rows.append(('battery lasts', f'{lasts}, {far} at this pace'))
     return rows
 
 
 def _travel_rows(card: dict) -> list[tuple[str, str]]:
     """Line of the ways of the actuators."""
-    ways = [one for one in told_in([card]) if one.group == 'actuator_travel']
+    ways = [one for one in scores_in([card]) if one.group == 'actuator_travel']
     texts = [f'{one.label.removesuffix(" travel")} {_text(card, one)}' for one in ways]
     return [('actuator travel', ', '.join(texts))]
 
@@ -172,10 +172,10 @@ def fault_texts(card: dict) -> list[str]:
     ]
 
 
-def event_texts(card: dict, told: str) -> list[str]:
+def event_texts(card: dict, part: str) -> list[str]:
     """What the guard told, or guidance of no progress: each once, its first time, how often."""
     first, count = {}, Counter()
-    for event in card.get(told, {}).get('events', []):
+    for event in card.get(part, {}).get('events', []):
         reaction, text = event.get('reaction'), event['message']
         if reaction not in (None, 'none', 'note'):
             text = f'{reaction}: {text}'
@@ -189,7 +189,7 @@ def event_texts(card: dict, told: str) -> list[str]:
 
 def title_of(scenario: str, changed: dict[str, str]) -> str:
     """Name of what was flown, and what was changed in it."""
-    return f'{scenario} with {told_fields(changed)}' if changed else scenario
+    return f'{scenario} with {fields_text(changed)}' if changed else scenario
 
 
 def print_card(card: dict, folder: Path, report: Path | None = None) -> None:

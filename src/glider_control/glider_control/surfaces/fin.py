@@ -103,5 +103,5 @@ def steer_by_fin(state, seen, params, dt):
 @kernel
 def fin_learnt(learnt, state, params):
     """Turn rate over sin(delta) at 0.5 m/s, alike in dive and climb, and what is there without."""
-    told = (state.known.b * params.turn_rate, state.known.d)
-    return Adaptation(*learnt[:7], *told, *told, *learnt[11:])
+    own = (state.known.b * params.turn_rate, state.known.d)
+    return Adaptation(*learnt[:7], *own, *own, *learnt[11:])

@@ -192,9 +192,9 @@ def _print_all(table: dict) -> None:
         ]
         before = _both(unfitted['w_rmse_cmps'], unfitted['peer_w_rmse_cmps'])
         energy = one['energy_error_percent']
-        told = '-' if energy is None else f'{energy:+.1f} %'
+        cell = '-' if energy is None else f'{energy:+.1f} %'
         shown = (one['flight'], str(one['segments']), before, *tried)
-        rows.append((*shown, '; '.join(turns) or '-', told))
+        rows.append((*shown, '; '.join(turns) or '-', cell))
     title = (
         'Vertical rate off in the other half, rms (cm/s): ours, the other model. Turn rate over '
         'sin(roll) or sin(fin) in dives and climbs (rad/s): recorded, fitted. Energy of the '

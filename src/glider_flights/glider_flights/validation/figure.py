@@ -27,8 +27,8 @@ def draw_validation(result: Validation, title: str, file: Path) -> None:
     minutes = (own.time_s - own.time_s[0])[shown] / 60.0
 
     def draw(place: str, name: str, label: str, *curves) -> None:
-        told = [(text, values[shown], colour) for text, values, colour in curves]
-        draw_curves(axes[place], minutes, name, ('time (min)', label), told, width=1.0)
+        drawn = [(text, values[shown], colour) for text, values, colour in curves]
+        draw_curves(axes[place], minutes, name, ('time (min)', label), drawn, width=1.0)
 
     def both(recorded: np.ndarray, simulated: np.ndarray) -> tuple:
         return ('recorded', recorded, BLUE), ('simulated', simulated, ORANGE)

@@ -101,12 +101,12 @@ def fitted(
     model: Model,
     impose: Imposed,
     names: tuple[str, ...],
-    told: list[Track],
+    by_adcp: list[Track],
     adcp: Adcp | None,
 ) -> Model:
     """Model with the named constants so that it flies most like the recording.
 
-    It is told the speed by an ADCP of the stretches ``told``.
+    It is told the speed by an ADCP of the stretches ``by_adcp``.
     """
     if not names:
         return model
@@ -131,7 +131,7 @@ def fitted(
     def wrong(values: np.ndarray) -> np.ndarray:
         tried = moved(values)
         off = [_wrong(track, tried, impose, step) for track in some]
-        for track in told:
+        for track in by_adcp:
             speed = speed_off(track, fly(track, tried, impose), adcp)
             off.append(speed[np.isfinite(speed)] / UNIT_ADCP_MPS)
         return np.nan_to_num(np.concatenate(off), nan=WORST, posinf=WORST, neginf=-WORST)
@@ -150,15 +150,15 @@ def fitted(
 
 def at_bounds(names: tuple[str, ...], start: Model, model: Model) -> list[str]:
     """Those of the fitted constants that ran to their bounds, in words."""
-    told = []
+    notes = []
     for name in names:
         one = CONSTANTS[name]
         value, ends = one.read(model), one.bounds(one.read(start))
         if min(abs(value - end) for end in ends) < 1e-3 * one.step:
-            told.append(
+            notes.append(
                 f'{name} ran to its bound, {value:g} {one.unit}: the flight does not tell it'
             )
-    return told
+    return notes
 
 
 def _balanced(some: list[Track], model: Model) -> Model:

@@ -55,7 +55,7 @@ def tracks(flight: Flight) -> list[Track]:
             found.append(_track(own, flight.origin_deg))
     if not any(track.counts.any() for track in found):
         raise ConfigurationError(
-            f'{flight.told}: no stretch under water of {SHORTEST_S:g} s and {SHALLOWEST_M:g} m '
+            f'{flight.label}: no stretch under water of {SHORTEST_S:g} s and {SHALLOWEST_M:g} m '
             'with depth and pitch (needed: one)'
         )
     return found
@@ -181,7 +181,7 @@ def check(flight: Flight, found: list[Track], impose: Imposed) -> None:
         if all(np.isnan(getattr(track.instruments, name)).all() for track in found):
             names = ' or '.join(names_of(flight.kind)[name])
             raise ConfigurationError(
-                f'{flight.told}: no value of {names} (needed for --impose {impose})'
+                f'{flight.label}: no value of {names} (needed for --impose {impose})'
             )
 
 

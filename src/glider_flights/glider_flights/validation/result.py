@@ -70,7 +70,7 @@ def validate(
     if isinstance(fit_on, Flight):
         if {fit_on.kind, flight.kind} == VEHICLES.keys():
             raise ConfigurationError(
-                f'{flight.told}: a {flight.kind} cannot be tried with what is fitted to a '
+                f'{flight.label}: a {flight.kind} cannot be tried with what is fitted to a '
                 f'{fit_on.kind} (allowed: --fit-on a {flight.kind})'
             )
         learnt_on, begun = tracks(fit_on), model_of(vehicle, fit_on)
@@ -79,8 +79,8 @@ def validate(
         learnt_on, tried = _halves(found, flight)[:: 1 if fit_on == 'first' else -1]
     has_adcp = adcp is not None and _heard(learnt_on, adcp)
     names = chosen('none' if fit_on == 'none' else fit, flight.kind, impose, has_adcp)
-    told = learnt_on if adcp is not None and set(BY_ADCP) & set(names) else []
-    learnt = fitted(learnt_on, begun, impose, names, told, adcp)
+    by_adcp = learnt_on if adcp is not None and set(BY_ADCP) & set(names) else []
+    learnt = fitted(learnt_on, begun, impose, names, by_adcp, adcp)
     model = start
     for name in names:
         model = CONSTANTS[name].write(model, CONSTANTS[name].read(learnt))
@@ -89,7 +89,7 @@ def validate(
         progress(number, len(tried))
         pairs.append((track, fly(track, model, impose)))
     speed = np.empty(0)
-    if told and fit_on is None:
+    if by_adcp and fit_on is None:
         speed = _crosswise(found, start, impose, names, adcp)
     elif adcp is not None:
         speed = np.concatenate([speed_off(*pair, adcp) for pair in pairs])
@@ -150,7 +150,7 @@ def _halves(found: list[Track], flight: Flight) -> tuple[list[Track], list[Track
     for part in parts:
         if len(part) < FEWEST:
             raise ConfigurationError(
-                f'{flight.told}: too few dives, stretches under water: {len(found)} (needed: '
+                f'{flight.label}: too few dives, stretches under water: {len(found)} (needed: '
                 f'{FEWEST} in each half)'
             )
     return parts
@@ -258,11 +258,11 @@ def validate_all(
 
 
 def _vehicle_of(flight: Flight) -> str:
-    told = f'{flight.kind} {flight.model}'.lower()
-    found = next((VEHICLES[kind] for kind in VEHICLES if kind in told), None)
+    name = f'{flight.kind} {flight.model}'.lower()
+    found = next((VEHICLES[kind] for kind in VEHICLES if kind in name), None)
     if found is None:
         raise ConfigurationError(
-            f'{flight.told}: PLATFORM_MODEL is {flight.model or "missing"} (allowed without '
+            f'{flight.label}: PLATFORM_MODEL is {flight.model or "missing"} (allowed without '
             f'--vehicle: a model with {" or ".join(VEHICLES)} in its name)'
         )
     return found

@@ -117,10 +117,10 @@ def _turn_rate(pairs, phase: float, by: str, power: float, recorded: bool) -> fl
     rows, rates = [], []
     for track, one in pairs:
         time_s = track.instruments.time_s
-        told = track.instruments if recorded else one
-        heading = told.heading_rad
+        flown = track.instruments if recorded else one
+        heading = flown.heading_rad
         # the fin is where it was recorded, also of the plant
-        angle = getattr(told if by in told._fields else track.instruments, by)
+        angle = getattr(flown if by in flown._fields else track.instruments, by)
         good = np.isfinite(heading) & np.isfinite(angle)
         if good.sum() < 3:
             continue
@@ -182,11 +182,11 @@ CC_PER_M3, BAR_PER_DBAR = 1e6, 0.1
 
 
 def peer(
-    told: list[Track], tried: list[Track], model: Model, names: tuple[str, ...]
+    fitting: list[Track], tried: list[Track], model: Model, names: tuple[str, ...]
 ) -> tuple[dict[str, Any] | None, str]:
     """Figures of the other model of this kind of vehicle, or None and why.
 
-    Its constants are fitted to the stretches ``told``, those that stand for ``names`` of ours, and
+    Its constants are fitted to some stretches, those that stand for ``names`` of ours, and
     it is tried on others. What a base station wrote is as it is: it has fitted it to all.
     """
     own = [track.instruments.own_rate_mps for track in tried]
@@ -197,10 +197,10 @@ def peer(
             import gliderflight
     except ConfigurationError as error:
         return None, str(error)
-    if any(np.isnan(track.density_kgpm3).all() for track in [*told, *tried]):
+    if any(np.isnan(track.density_kgpm3).all() for track in [*fitting, *tried]):
         return None, 'gliderflight needs temperature and salinity, which were not recorded'
-    fits = [THEIRS[name] for name in names if name in THEIRS] if told else []
-    rates = _gliderflight(gliderflight, told, tried, model, fits)
+    fits = [THEIRS[name] for name in names if name in THEIRS] if fitting else []
+    rates = _gliderflight(gliderflight, fitting, tried, model, fits)
     return {**_figures('gliderflight', tried, rates), 'fitted': fits}, ''
 
 
@@ -212,20 +212,20 @@ def _figures(name: str, found: list[Track], rates: list[np.ndarray]) -> dict[str
 
 
 def _gliderflight(
-    gliderflight, told: list[Track], tried: list[Track], model: Model, fits: list[str]
+    gliderflight, fitting: list[Track], tried: list[Track], model: Model, fits: list[str]
 ) -> list[np.ndarray]:
-    """Vertical rates (m/s, + down) of Merckelbach's steady model, fitted to what it is told.
+    """Vertical rates (m/s, + down) of Merckelbach's steady model, fitted.
 
     Unfitted it weighs what our file says; a fit begins with the weight of the water.
     """
-    rho_0 = float(np.nanmean(np.concatenate([track.density_kgpm3 for track in told or tried])))
+    rho_0 = float(np.nanmean(np.concatenate([track.density_kgpm3 for track in fitting or tried])))
     theirs = gliderflight.SteadyStateCalibrate(rho0=rho_0)
     vehicle = model.vehicle
     weight = rho_0 * vehicle.volume if fits else vehicle.m + vehicle.ballast
     theirs.define(ah=LIFT, Cd1=INDUCED, Cd0=DRAG, mg=weight, Vg=vehicle.volume)
     if fits:
-        theirs.set_input_data(**_inputs(told, model))
-        theirs.set_mask(~np.concatenate([track.counts for track in told]))
+        theirs.set_input_data(**_inputs(fitting, model))
+        theirs.set_mask(~np.concatenate([track.counts for track in fitting]))
         theirs.calibrate(*fits)
     theirs.set_input_data(**_inputs(tried, model))
     theirs.set_mask(~np.concatenate([track.counts for track in tried]))

@@ -66,8 +66,8 @@ class GuidanceNode(BlockNode):
 
     def tell_path(self, stamp_ns: int) -> None:
         """Publish the path that is followed from a tick on."""
-        self.told_path = self.settings.path
-        self.publish_path(path_message(self.told_path.points(PATH_POINTS), stamp_ns))
+        self.path_published = self.settings.path
+        self.publish_path(path_message(self.path_published.points(PATH_POINTS), stamp_ns))
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick, by the orders that hold from it on."""
@@ -75,7 +75,7 @@ class GuidanceNode(BlockNode):
         for order in due(self.waiting, self.tick, self.flags[0] if self.flags else -1):
             self.waiting.remove(order)
             self.follow(stamp_ns, order)
-        if self.settings.path != self.told_path:
+        if self.settings.path != self.path_published:
             self.tell_path(stamp_ns)
         before = self.flags[2] if self.flags else 0
         super().step(stamp_ns, *inputs)
@@ -101,12 +101,12 @@ class GuidanceNode(BlockNode):
             self.on_battery(raw)
         is_silent = stamp_ns - self.battery_ns > SLOW_S['battery'] * SECOND_NS
         battery = Battery(*WHEN_SILENT['battery']) if is_silent else self.battery
-        told = {
+        status = {
             name: value if isinstance(value, str | int) else round(value, 3)
             for name, value in status_of(self.state, self.params, battery)._asdict().items()
         }
         said, name = self.block.say(*self.flags), self.get_fully_qualified_name()
-        values = {**told, 'order': self.answer}
+        values = {**status, 'order': self.answer}
         level = health.LEVELS[said.level]
         self.publish_status(health.status_array(stamp_ns, name, level, said.message, values))
 

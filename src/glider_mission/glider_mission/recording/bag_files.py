@@ -91,8 +91,8 @@ def metadata_text(files: Mapping[str, Summary]) -> str:
         for channel in file.channels.values():
             schema = file.schemas.get(channel.schema_id)
             kind = schema.name if schema else ''
-            told = _topic(channel.topic, kind, channel.metadata, counts[channel.topic])
-            topics.setdefault(channel.topic, told)
+            topic = _topic(channel.topic, kind, channel.metadata, counts[channel.topic])
+            topics.setdefault(channel.topic, topic)
     said = [file.statistics for file in files.values()]
     filled = [one for one in said if one.message_count] or said[:1]
     start_ns = min(one.message_start_time for one in filled)

@@ -110,10 +110,10 @@ class _File:
         stream.seek(end)
         rest = stream.read(len(_DATA_END) + 4)
         ends = rest.startswith(_DATA_END) and len(rest) == len(_DATA_END) + 4
-        told = int.from_bytes(rest[len(_DATA_END) :], 'little') if ends else 0
-        if told and told != checksum:
+        stored = int.from_bytes(rest[len(_DATA_END) :], 'little') if ends else 0
+        if stored and stored != checksum:
             unsound = 'the checksum (CRC) of its data is wrong'
-        elif told:
+        elif stored:
             unsound = ''
         elif summary and not ends:
             unsound = f'no record begins at byte {end:,}'
@@ -125,7 +125,7 @@ class _File:
         if unsound or not is_enough:
             for part in self.parts:
                 self.read(part)
-        if summary and (unsound or not told):
+        if summary and (unsound or not stored):
             self._compare(summary)
         if unsound:
             raise self._harmed(unsound)
@@ -153,8 +153,8 @@ class _File:
         elif opcode in records.DEFINITIONS:
             self._define(records.parse(records.DEFINITIONS[opcode], data))
         elif opcode == Opcode.ATTACHMENT:
-            one, told = records.parse(Attachment, data), int.from_bytes(data[-4:], 'little')
-            if told and zlib.crc32(memoryview(data)[:-4]) != told:
+            one, stored = records.parse(Attachment, data), int.from_bytes(data[-4:], 'little')
+            if stored and zlib.crc32(memoryview(data)[:-4]) != stored:
                 raise self._harmed(f'the checksum (CRC) of the attachment {one.name!r} is wrong')
             self.attachments.setdefault(one.name, one.data)
             self._attached.add(at)
@@ -172,8 +172,8 @@ class _File:
         for order, index in enumerate(indexes, 1):
             times = index.message_start_time, index.message_end_time
             if self._chunks.get(index.chunk_start_offset) != times:
-                told = f'chunk {order} ({records.span(*times)})'
-                raise self._harmed(f'{told} is not where it should be')
+                where = f'chunk {order} ({records.span(*times)})'
+                raise self._harmed(f'{where} is not where it should be')
         if {index.offset for index in summary.attachment_indexes} - self._attached:
             raise self._harmed('an attachment is not where it should be')
         here = len(self._chunks)

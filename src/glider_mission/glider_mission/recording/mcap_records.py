@@ -31,7 +31,7 @@ _FOOTER = struct.Struct('<BQQQI')
 UNREADABLE = (McapError, struct.error, UnicodeDecodeError, OverflowError)
 #: Records that messages are read by.
 DEFINITIONS = {Opcode.SCHEMA: Schema, Opcode.CHANNEL: Channel}
-_NOT_TOLD = -1  #: by a zstd frame: the size of its content
+_NO_SIZE = -1  #: by a zstd frame: the size of its content
 
 
 def span(start_ns: int, end_ns: int) -> str:
@@ -90,9 +90,9 @@ def unpack(data: bytes) -> bytes:
     try:
         chunk = parse(Chunk, data)
         size = chunk.uncompressed_size
-        told = zstandard.frame_content_size(chunk.data) if chunk.compression == 'zstd' else size
-        if told not in (size, _NOT_TOLD):
-            raise ValueError(f'{told:,} bytes in place of {size:,}')
+        stored = zstandard.frame_content_size(chunk.data) if chunk.compression == 'zstd' else size
+        if stored not in (size, _NO_SIZE):
+            raise ValueError(f'{stored:,} bytes in place of {size:,}')
         stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     except (*UNREADABLE, zstandard.ZstdError, RuntimeError, MemoryError) as error:
         raise ValueError(f'it does not decompress ({error})') from None

@@ -13,7 +13,7 @@ from glider_base.linear import solve
 from glider_base.noise import random_stream
 from glider_base.signals import TICK_S
 from glider_mission.routing.fronts import Chart, current_on
-from glider_mission.scenario import Scenario, check_starts, told_of
+from glider_mission.scenario import Scenario, check_starts, named_in
 from glider_model.ocean.bottom import bottom_depth
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.ocean.current_settings import CurrentSettings
@@ -80,16 +80,16 @@ def forecast_of(scenario: Scenario, stay: float) -> Forecast:
     For the share ``stay`` of the time the vehicle is at the surface. Raises ConfigurationError if
     the file of the forecast cannot be read, or does not cover the mission.
     """
-    told, current = scenario.forecast, scenario.current
-    if told.file:
-        current = CurrentSettings(field=GridSettings(file=told.file))
+    forecast, current = scenario.forecast, scenario.current
+    if forecast.file:
+        current = CurrentSettings(field=GridSettings(file=forecast.file))
     steady = [one for one in current.components if one.kind != 'gauss_markov']
     settings = scenario.resolved_current(current.model_copy(update={'components': steady}))
-    late_s, grid = 3600.0 * told.late_h, settings.field
+    late_s, grid = 3600.0 * forecast.late_h, settings.field
     if isinstance(grid, GridSettings):
         grid = grid.resolved(grid.mission.model_copy(update={'earlier_s': late_s}))
         settings = settings.model_copy(update={'field': grid})
-    with told_of('forecast: ', ValueError):
+    with named_in('forecast: ', ValueError):
         params = settings.params(0)
     true = scenario.resolved_current(scenario.current).field
     if isinstance(grid, GridSettings) and isinstance(true, GridSettings):
@@ -109,9 +109,9 @@ def forecast_of(scenario: Scenario, stay: float) -> Forecast:
     if scenario.bathymetry.file:
         bottom = scenario.bottom()
         land |= np.array([[bottom_depth(n, e, bottom) <= 0.0 for e in easts] for n in norths])
-    error_mps = told.error_mps
+    error_mps = forecast.error_mps
     if error_mps > 0.0:
-        erring = erroneous(chart, error_mps, told.error_km, scenario.seed, 0)
+        erring = erroneous(chart, error_mps, forecast.error_km, scenario.seed, 0)
         chart, error_mps = expected(erring, error_mps)
     return Forecast(chart, stays, land, error_mps)
 
@@ -196,8 +196,8 @@ def observed(chart: Chart, seen: np.ndarray, error_mps: float, error_km: float) 
     if not len(seen):
         return chart
     length, (times, norths, easts, _) = 1e3 * error_km, chart
-    told = np.array([current_on(chart, *one) for one in seen[:, :3]])
-    off = seen[:, 3:] - told
+    charted = np.array([current_on(chart, *one) for one in seen[:, :3]])
+    off = seen[:, 3:] - charted
     error_mps = max(error_mps, math.sqrt(float(np.mean(off**2))))
 
     alike = _alike_each_other(seen, length)

@@ -67,7 +67,7 @@ class Pilot:
         self._last: tuple[float, np.ndarray] = (0.0, self._waypoints[0])
         self._way: tuple[float, ...] = ()  #: middle of the last dive segment: time, north, east
         self._up_s = 0.0  #: time for which it has been at the surface
-        self._was_told, self._is_straight = True, True
+        self._was_ordered, self._is_straight = True, True
         self.orders: list[Order] = []  #: that it gave
 
     def order(self, tick: int, row: np.ndarray | None) -> Order | None:
@@ -83,12 +83,12 @@ class Pilot:
         place = np.array([row[_ODOM + 1], row[_ODOM]])
         self._pass(place)
         if not is_surfaced(int(row[_STAGE])):
-            self._up_s, self._was_told = 0.0, False
+            self._up_s, self._was_ordered = 0.0, False
             return None
         self._up_s += LOOK_TICKS * TICK_S
-        if self._was_told or self._up_s < self._listen_s:
+        if self._was_ordered or self._up_s < self._listen_s:
             return None
-        self._was_told = True
+        self._was_ordered = True
         self._look(t_s, place, row[_BELIEVED])
         if math.dist(place, self._waypoints[-1]) < _LAST_M:
             return None

@@ -127,7 +127,7 @@ def _energy(
     vehicle, profile = load_vehicle(scenario.vehicle), params.profile
     if vehicle.energy is None:
         return None, 0.0
-    told, body = vehicle.energy.params(), vehicle.params()
+    energy, body = vehicle.energy.params(), vehicle.params()
     levels = np.linspace(0.0, profile.depth, _LEVELS)
     water = scenario.resolved_water().params()
     empty = [immersed(float(depth), 0.0, body, water) for depth in levels]
@@ -143,12 +143,12 @@ def _energy(
     as_drag = law.drag_ki_kg_per_m / (law.ki_kg_per_m + law.drag_ki_kg_per_m or 1.0)
     out_kg[-1] += heavy - rising[-1] + 2.0 * as_drag * max(0.0, heavy - profile.net_heaviness)
     # as much pumped out at a level, and let in again (J/kg)
-    costs = np.maximum(0.0, told.out + told.out_per_m * levels) + max(0.0, told.let_in)
+    costs = np.maximum(0.0, energy.out + energy.out_per_m * levels) + max(0.0, energy.let_in)
     dives, call, top = max(1, profile.surface_every), 0.0, 0.0
     if stay_s:
         top = _over_kg(params, vehicle) * costs[0]
-        call = told.call_start + told.call * min(told.call_s, stay_s)
-    hotel = 0.5 * (told.dive + told.climb) * (cycle_s - stay_s) + told.surface * stay_s
+        call = energy.call_start + energy.call * min(energy.call_s, stay_s)
+    hotel = 0.5 * (energy.dive + energy.climb) * (cycle_s - stay_s) + energy.surface * stay_s
     flat = (dives * out_kg.sum() * costs[0] + top + call) / dives
     return (dives * out_kg @ costs[1:] + top + call + hotel) / 3600.0, flat / 3600.0
 
@@ -306,9 +306,9 @@ def waypoints_of(scenario: Scenario) -> np.ndarray:
 
 def with_errors(chart: Chart, error_mps: float, scenario: Scenario) -> Iterator[Chart]:
     """A chart with one after the other of `MEMBERS` errors; as it is if it has none."""
-    told = scenario.forecast
+    forecast = scenario.forecast
     for member in range(MEMBERS if error_mps > 0.0 else 0):
-        yield erroneous(chart, error_mps, told.error_km, scenario.seed, member + 1)
+        yield erroneous(chart, error_mps, forecast.error_km, scenario.seed, member + 1)
     if not error_mps:
         yield chart
 

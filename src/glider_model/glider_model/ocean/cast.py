@@ -122,8 +122,8 @@ def read_cast(path: Path) -> list[list[float]]:
     names = [name for name, _ in found]
     table = {name: np.array([row[name] for _, row in found]) for name in columns}
     if 'density_kgpm3' not in table:
-        told = (table[name] for name in ('depth_m', 'temperature_degC', 'salinity_psu'))
-        table['density_kgpm3'], _ = density_of(source, *told)
+        measured = (table[name] for name in ('depth_m', 'temperature_degC', 'salinity_psu'))
+        table['density_kgpm3'], _ = density_of(source, *measured)
     order = [name for name in ('depth_m', *COLUMNS[1:3]) if name in table]
     rows = [[float(number) for number in row] for row in zip(*map(table.get, order), strict=True)]
     check_cast(rows, names, source)

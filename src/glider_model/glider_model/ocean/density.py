@@ -107,7 +107,7 @@ def buoyancy_gain(depth, mass, density):
 
 @immersed.body(DensityParams)
 @kernel
-def _in_told_water(depth, m_b, vehicle, params):
+def _in_given_water(depth, m_b, vehicle, params):
     """Of a vehicle without a volume neutral at the surface, with coefficients as they are."""
     if vehicle.volume == 0.0:
         gain = buoyancy_gain(depth, vehicle.m, params)

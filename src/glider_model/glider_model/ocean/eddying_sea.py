@@ -110,7 +110,7 @@ def write_sea(sea: EddyingSea, path: Path) -> None:
         )
         for name, side, values in (('uo', 'east', east), ('vo', 'north', north))
     }
-    told = ', '.join(f'{name} {value}' for name, value in sea)
-    source = {'Conventions': 'CF-1.8', 'source': f'made up, by ./glider ocean: {told}'}
+    numbers = ', '.join(f'{name} {value}' for name, value in sea)
+    source = {'Conventions': 'CF-1.8', 'source': f'made up, by ./glider ocean: {numbers}'}
     data = xarray.Dataset(variables, coords, source)
     data.to_netcdf(path, engine='scipy', encoding={name: packed for name in variables})

@@ -214,7 +214,7 @@ def _listed(dataset: 'xarray.Dataset') -> str:
 def _candidates(dataset: 'xarray.Dataset', wanted: Wanted) -> dict[str, str]:
     """What CF calls each variable that may be what is wanted."""
     named, known = _named(dataset), wanted.names
-    found = {name: told for name, told in named.items() if told in known.values()}
+    found = {name: standard for name, standard in named.items() if standard in known.values()}
     return found or {name: known[name.lower()] for name in named if name.lower() in known}
 
 
@@ -234,8 +234,8 @@ def _variable(dataset: 'xarray.Dataset', wanted: Wanted) -> tuple[str, str]:
 
 def _axis_of(name: str, variable: 'xarray.Variable') -> str:
     """Which axis a coordinate is; empty if none."""
-    told = variable.attrs
-    units, standard = str(told.get('units', '')), told.get('standard_name')
+    attrs = variable.attrs
+    units, standard = str(attrs.get('units', '')), attrs.get('standard_name')
     if standard in _AXES:
         return standard
     if ' since ' in units or name.lower() == 'time':
@@ -243,7 +243,7 @@ def _axis_of(name: str, variable: 'xarray.Variable') -> str:
     for axis, prefix in (('latitude', 'degrees_n'), ('longitude', 'degrees_e')):
         if units.lower().startswith(prefix) or name.lower() in (axis, axis[:3]):
             return axis
-    is_depth = told.get('axis') == 'Z' or told.get('positive') in ('up', 'down')
+    is_depth = attrs.get('axis') == 'Z' or attrs.get('positive') in ('up', 'down')
     return 'depth' if is_depth or name.lower() in ('depth', 'lev') else ''
 
 
@@ -297,9 +297,9 @@ def _times(variable: 'xarray.Variable') -> np.ndarray:
     return values.astype('datetime64[ns]').astype(np.int64) / 1e9
 
 
-def _scale(name: str, told: dict, units: dict[str, float]) -> float:
+def _scale(name: str, attrs: dict, units: dict[str, float]) -> float:
     """What the numbers of a variable are multiplied by, as its attributes tell."""
-    unit = str(told.get('units', 'm' if units is _LENGTHS else '')).strip()
+    unit = str(attrs.get('units', 'm' if units is _LENGTHS else '')).strip()
     if unit not in units:
         raise ValueError(f'{name}: units = {unit!r} (allowed: {", ".join(units)})')
     return units[unit]
@@ -325,9 +325,9 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
                          'staggered grid has them (allowed: both at the same places)')  # fmt: skip
     scales = []
     for one, (name, standard) in zip(wanted, found, strict=True):
-        told = dataset[name].attrs
-        points = told.get('positive', 'up' if standard in _HEIGHTS else 'down')
-        scales.append(_scale(name, told, one.units) * (-1.0 if points == 'up' else 1.0))
+        attrs = dataset[name].attrs
+        points = attrs.get('positive', 'up' if standard in _HEIGHTS else 'down')
+        scales.append(_scale(name, attrs, one.units) * (-1.0 if points == 'up' else 1.0))
     values = {axis: np.zeros(1) for axis in _AXES[:2]}
     for axis, dimension in axes.items():
         one = dataset.variables[dimension]
@@ -434,9 +434,9 @@ def _refuse_uncovered(axes: Axes, window: Window) -> None:
         first, last = axes.times[0], axes.times[-1]
         if window.begin < first or window.begin + window.lasts > last:
             raise ValueError(
-                f'the mission goes from {told_time(window.begin)} to '
-                f'{told_time(window.begin + window.lasts)} (allowed: within '
-                f'{told_time(first)} to {told_time(last)}, the times of the file)'
+                f'the mission goes from {time_text(window.begin)} to '
+                f'{time_text(window.begin + window.lasts)} (allowed: within '
+                f'{time_text(first)} to {time_text(last)}, the times of the file)'
             )
     elif len(axes.times) > 1 and window.lasts > axes.times[-1] - axes.times[0]:
         raise ValueError(
@@ -447,7 +447,7 @@ def _refuse_uncovered(axes: Axes, window: Window) -> None:
     first, last = (DAY_S * day for day in _hole(axes.times / DAY_S))
     if begin < last and begin + window.lasts > first:
         raise ValueError(
-            f'no water between {told_time(first)} and {told_time(last)}, of the mission '
+            f'no water between {time_text(first)} and {time_text(last)}, of the mission '
             f'(allowed: steps of <= {HOLE_STEPS:g} times those beside them)'
         )
     for name, values, low, high in (
@@ -492,7 +492,7 @@ def _read(
             read = _cut(layout.dataset[name], present, now).reshape(shape[1:])
             read = layout.scales[component] * read
             if wanted:
-                what = f'{name} at {told_time(axes.times[step])}'
+                what = f'{name} at {time_text(axes.times[step])}'
                 _refuse_no_water(what, read, wanted[component])
             dry = ~np.isfinite(read)
             filled = _fill_land(read)
@@ -602,10 +602,10 @@ def _part(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> Part:
         }
         for name, standard, one in zip(layout.variables, layout.standards, wanted, strict=True)
     ]
-    told = dict(zip(_AXES, axes, strict=True))
-    return Part(variables, {axis: told[axis] for axis in _allowed(wanted)}, seen)
+    by_name = dict(zip(_AXES, axes, strict=True))
+    return Part(variables, {axis: by_name[axis] for axis in _allowed(wanted)}, seen)
 
 
-def told_time(seconds: float) -> str:
+def time_text(seconds: float) -> str:
     """A time (s since 1970, UTC) as a person reads it."""
     return f'{datetime.fromtimestamp(seconds, timezone.utc):%Y-%m-%dT%H:%MZ}'

@@ -168,7 +168,7 @@ class WaterSettings(DensitySettings):
     def _check_rows(self):
         if self.profile is None and not self.grid.file:
             return self
-        told = 'grid' if self.grid.file else 'profile'
+        source = 'grid' if self.grid.file else 'profile'
         if self.profile is not None:
             check_cast(self.profile, range(1, len(self.profile) + 1), 'profile')
             if self.grid.file:
@@ -176,8 +176,8 @@ class WaterSettings(DensitySettings):
         for name in ('pycnocline_rise', 'compression_per_m'):
             if getattr(self, name):
                 raise ValueError(
-                    f'{name} = {getattr(self, name)!r}: the {told} says the density '
-                    f'(allowed: 0.0 beside a {told})'
+                    f'{name} = {getattr(self, name)!r}: the {source} says the density '
+                    f'(allowed: 0.0 beside a {source})'
                 )
         return self
 

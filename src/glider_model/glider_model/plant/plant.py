@@ -19,7 +19,7 @@ from glider_model.ocean.water import WaterSettings, around, with_wind
 from glider_model.plant.energy import FULL, Ledger, battery_of, spend
 from glider_model.plant.faults.body import acting, blown, felt, moved
 from glider_model.plant.faults.kinds import FaultParams, NoFaultState, begun, summed
-from glider_model.plant.faults.sensing import remembered, told
+from glider_model.plant.faults.sensing import remembered, with_faults
 from glider_model.plant.faults.settings import FAULTS, Fault, fault_params, fault_state
 from glider_model.plant.motion import Motion, integrate
 from glider_model.plant.readings import Readings, health_of, make_readings, read
@@ -265,7 +265,7 @@ def tell(state, params):
     )
     health, battery = health_of(state), battery_of(state.ledger, params.energy)
     numbers = (*numbers[:-1], health, battery, numbers[-1])
-    return told(numbers, state, params.sensors, params.faults)
+    return with_faults(numbers, state, params.sensors, params.faults)
 
 
 @slot

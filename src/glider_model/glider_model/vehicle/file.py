@@ -13,7 +13,7 @@ import pydantic
 from pydantic import Field
 
 from glider_base import plugins
-from glider_base.errors import told_changes
+from glider_base.errors import changes_text
 from glider_base.files import read_bytes, read_yaml, yaml_line, yaml_text
 from glider_base.settings import Settings, file_names, find_field, find_file, holder_of, validate
 from glider_base.signals import Joints
@@ -466,7 +466,7 @@ def _read_vehicle(path: Path, name: str, mtime_ns: int, size: int) -> Vehicle:
         here = any(f'{where}.'.startswith(f'{field}.') for field in changes)
         return None if here else yaml_line(path, location)
 
-    changed = told_changes({f'vehicle.{field}': value for field, value in changes.items()})
+    changed = changes_text({f'vehicle.{field}': value for field, value in changes.items()})
     values = _changed_values(read_yaml(path), changes)
     return validate(Vehicle, values, str(path), line_of=line_of, changed=changed)
 

@@ -51,8 +51,8 @@ def quantity(unit: str, also: Other | None = None, **limits: float) -> type[Sett
         value, source = values.get('value'), values.get('source')
         if isinstance(value, bool) or not isinstance(value, int | float):
             return {**values, 'unit': unit}
-        told = f'{source} ({value:g} {also.unit})' if isinstance(source, str) else source
-        return {**values, 'value': value * also.factor, 'unit': unit, 'source': told}
+        text = f'{source} ({value:g} {also.unit})' if isinstance(source, str) else source
+        return {**values, 'value': value * also.factor, 'unit': unit, 'source': text}
 
     value = float, Field(strict=True, description=f'number in {unit}', **limits)
     convert = pydantic.model_validator(mode='before')(convert)

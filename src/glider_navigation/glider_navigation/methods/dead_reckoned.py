@@ -194,13 +194,13 @@ def _dive(way, stay):
 
 
 @kernel
-def _go_on(way, through, current, told, t_s, dt):
+def _go_on(way, through, current, predicted, t_s, dt):
     """The way a tick later, at velocities through the water, of current and forecast (m/s)."""
     return replace(
         way,
         through=plus(way.through, through, dt),
         believed=plus(way.believed, current, dt),
-        forecast=plus(way.forecast, told, dt),
+        forecast=plus(way.forecast, predicted, dt),
         t_s=way.t_s + dt,
         cos_s=way.cos_s + dt * math.cos(TIDE * t_s),
         sin_s=way.sin_s + dt * math.sin(TIDE * t_s),
@@ -210,8 +210,8 @@ def _go_on(way, through, current, told, t_s, dt):
 @kernel
 def _at_the_top(place, t_s, current, trust, params):
     """Current (m/s) that is believed for a place at the surface (m) and a time (s)."""
-    told = forecast_at(params.forecast, place, 0.0, t_s)
-    return plus(belief.current_at(current, t_s), told, trust.share)
+    predicted = forecast_at(params.forecast, place, 0.0, t_s)
+    return plus(belief.current_at(current, t_s), predicted, trust.share)
 
 
 @kernel
@@ -315,9 +315,9 @@ def dead_reckoned_step(state, heard, params, dt):
     if under:
         psi = attitude.angles.psi
         through = Vector(flight.speed * math.cos(psi), flight.speed * math.sin(psi))
-        told = forecast_at(params.forecast, state.place, flight.depth, t_s)
-        water = plus(belief.current_at(current, t_s), told, trust.share)
-        way = _go_on(way, through, water, told, t_s, dt)
+        predicted = forecast_at(params.forecast, state.place, flight.depth, t_s)
+        water = plus(belief.current_at(current, t_s), predicted, trust.share)
+        way = _go_on(way, through, water, predicted, t_s, dt)
         place, velocity = _end_of(way), plus(through, water)
         covariance = place_covariance(way, current, trust, column, params)
         phase = UNDER_WATER

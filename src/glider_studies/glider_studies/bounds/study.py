@@ -63,7 +63,7 @@ def _phase(glide: Glide, starts: int, seed: int, done: Callable[[], None]) -> di
     found = region(loop, lambda reach: slope(glide, reach))
     gains = {name: gain(loop, i) for i, name in enumerate(INPUTS)}
     least = dict(zip(INPUTS, reached(loop).tolist(), strict=True))
-    told = {
+    result = {
         'loop': _of_loop(glide, loop),
         'gains': {
             name: one and _of_gain(one, least[name], INPUTS[name]) for name, one in gains.items()
@@ -73,25 +73,27 @@ def _phase(glide: Glide, starts: int, seed: int, done: Callable[[], None]) -> di
         'jumps': None,
     }
     if starts and found:
-        told['starts'] = fly_starts(glide, found, starts, seed, done)
+        result['starts'] = fly_starts(glide, found, starts, seed, done)
     if starts and gains['current']:
-        told['jumps'] = fly_jumps(glide, gains['current'], _jumps(starts), seed, done)
-    told['failed'] = _failed(told)
-    return told
+        result['jumps'] = fly_jumps(glide, gains['current'], _jumps(starts), seed, done)
+    result['failed'] = _failed(result)
+    return result
 
 
-def _failed(told: dict[str, Any]) -> list[str]:
+def _failed(result: dict[str, Any]) -> list[str]:
     """What does not hold, in words."""
     failed = [
-        f'no certificate of the gain from {name}' for name, one in told['gains'].items() if not one
+        f'no certificate of the gain from {name}'
+        for name, one in result['gains'].items()
+        if not one
     ]
-    if not told['region']:
+    if not result['region']:
         failed.append('no certificate of a region')
-    if told['loop']['sensitivity'] is None:
+    if result['loop']['sensitivity'] is None:
         failed.append('the loop is unstable somewhere in the box')
-    elif told['loop']['sensitivity'] >= SENSITIVITY_MAX:
+    elif result['loop']['sensitivity'] >= SENSITIVITY_MAX:
         failed.append(f'max |S| is not below {SENSITIVITY_MAX}')
-    starts, jumps = told['starts'], told['jumps']
+    starts, jumps = result['starts'], result['jumps']
     if starts and starts['home'] < starts['starts']:
         failed.append('a start did not come home')
     if starts and starts['of_bound'] > 1.0:

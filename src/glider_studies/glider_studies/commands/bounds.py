@@ -10,12 +10,12 @@ from typing import Annotated, Any
 import typer
 
 from glider_base.errors import EXIT_FAILED
-from glider_base.kernel import compiling_told
+from glider_base.kernel import on_compiling
 from glider_bringup.console import (
     Json,
     compiling,
     counter,
-    interrupted_told,
+    interrupt_shown,
     messages,
     output,
     print_table,
@@ -51,8 +51,8 @@ def bounds(
 
     line = 'compiling the mathematics of law and guidance, once; up to half a minute'
     with (
-        interrupted_told(),
-        compiling_told(partial(compiling, line)),
+        interrupt_shown(),
+        on_compiling(partial(compiling, line)),
         counter('simulating', study.flights(starts)) as update,
     ):
         found = study.bounds(vehicle, starts, seed, update)

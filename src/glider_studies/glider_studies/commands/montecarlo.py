@@ -86,7 +86,7 @@ def montecarlo(
     if out:
         write_whole(out / study.RESULT_FILE, json.dumps(whole, indent=2) + '\n')
     if as_json:
-        print(json.dumps({name: told for name, told in whole.items() if name != 'flown'}))
+        print(json.dumps({name: value for name, value in whole.items() if name != 'flown'}))
     else:
         _print_study(whole)
 
@@ -100,19 +100,19 @@ def _print_study(study: dict) -> None:
         return ' / '.join('-' if x is None else f'{x:,.3f}' for x in figures)
 
     rows = study['rows']
-    told = [row['navigation'] for row in rows]
+    navigation = [row['navigation'] for row in rows]
     lines = {
         'flown to their end': [str(row['flown_to_end']) for row in rows],
         'diverged': [str(row['diverged']) for row in rows],
         **{label: [show(row[key]) for row in rows] for key, label in studied()},
     }
-    if any(one['ellipse_95_share'] is not None for one in told):
+    if any(one['ellipse_95_share'] is not None for one in navigation):
         lines |= {
-            'surfacings': [f'{one["surfacings"]:,}' for one in told],
-            'position error, from the 4th (m)': [show(one['error_m']) for one in told],
-            'cross-track, from the 4th (m)': [show(one['cross_track_m']) for one in told],
-            'inside the 95 % ellipse': [show(one['ellipse_95_share']) for one in told],
-            'innovation squared': [show(one['innovation_squared']) for one in told],
+            'surfacings': [f'{one["surfacings"]:,}' for one in navigation],
+            'position error, from the 4th (m)': [show(one['error_m']) for one in navigation],
+            'cross-track, from the 4th (m)': [show(one['cross_track_m']) for one in navigation],
+            'inside the 95 % ellipse': [show(one['ellipse_95_share']) for one in navigation],
+            'innovation squared': [show(one['innovation_squared']) for one in navigation],
         }
     lines |= {
         'plants statically unstable': [str(row['statically_unstable']) for row in rows],

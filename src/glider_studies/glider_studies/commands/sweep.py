@@ -25,7 +25,7 @@ from glider_studies.workers import workers_at_work
 
 app = typer.Typer()
 #: So many of the cells that failed are told one by one.
-FAILURES_TOLD = 5
+FAILURES_SHOWN = 5
 #: Fields over which a sweep can be drawn as a map.
 MAPPED = {'current.speed_kn', 'current.angle_deg'}
 
@@ -88,9 +88,9 @@ def sweep(
         output.print(f'result: {summary["file"]}', soft_wrap=True)
         if MAPPED <= {axis.field for axis in plan.axes}:
             messages.print(f'draw it: {shlex.join(["./glider", "map", summary["file"]])}')
-    for failure in failures[:FAILURES_TOLD]:
+    for failure in failures[:FAILURES_SHOWN]:
         messages.print(f'failed: {failure["reason"]}\n  {failure["command"]}', soft_wrap=True)
-    if len(failures) > FAILURES_TOLD:
-        messages.print(f'and {len(failures) - FAILURES_TOLD} more, see "reason" in the result')
+    if len(failures) > FAILURES_SHOWN:
+        messages.print(f'and {len(failures) - FAILURES_SHOWN} more, see "reason" in the result')
     if failures:
         raise typer.Exit(EXIT_FAILED)

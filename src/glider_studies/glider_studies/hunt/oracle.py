@@ -180,10 +180,10 @@ def _late(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
     surfaces = (truth.rows & (SURFACES | DROPS)) != 0
     if not surfaces.any():
         return ''
-    told, depth = int(np.argmax(surfaces)), truth.depth
-    struck = [round(one) for one in sorted(begun_s) if told < one < len(depth) - 1.0]
+    sent_up, depth = int(np.argmax(surfaces)), truth.depth
+    struck = [round(one) for one in sorted(begun_s) if sent_up < one < len(depth) - 1.0]
     struck = [_sinks_s(depth, one) for one in struck if depth[one] < AT_SURFACE_M]
-    for start, end in pairwise([told, *struck, len(depth)]):
+    for start, end in pairwise([sent_up, *struck, len(depth)]):
         limit_s = due_s(float(depth[start]))
         late = depth[start + round(limit_s) : end]
         if not _is_under(late):
@@ -234,14 +234,14 @@ def unfounded(scenario: Scenario, truth: Truth, rows: int) -> int:
 
     None is, where the first was told of one that its whole pump does not bring up.
     """
-    found, told, stands_s = 0, truth.rows, round(STANDS_S)
+    found, reported, stands_s = 0, truth.rows, round(STANDS_S)
     for bit in (1 << at for at in range(rows.bit_length()) if rows & 1 << at):
-        if (told & bit).any():
-            at = int(np.argmax((told & bit) != 0))
+        if (reported & bit).any():
+            at = int(np.argmax((reported & bit) != 0))
             if at < stands_s or not _hangs(truth.depth[at - stands_s : at]):
                 found |= bit
     if found:
-        first = int(np.argmax((told & found) != 0))
+        first = int(np.argmax((reported & found) != 0))
         done = _all_done(scenario, first + 1.0, due_s(truth.deepest), drops=False)
         if not any(map(_comes_up, done)):
             return 0

@@ -102,17 +102,17 @@ def experiment(seed: int, flights: int) -> Experiment:
     """
 
     def rows(flown: dict[int, Flown]) -> tuple[list[dict], dict[str, Any]]:
-        told = []
+        table = []
         for number, one in flown.items():
             mission = draw_mission(seed, number)
             harms = [(one.verdict, one.faults)] if one.verdict.kind else []
             harms += [(Verdict(FALSE, one.latched), [])] if one.latched else []
-            told += [
+            table += [
                 {'flight': number, **said._asdict(), 'command': command(mission, faults)}
                 for said, faults in harms
             ]
         hours = round(sum(one.hours for one in flown.values()), 1)
-        return told, {'flights': flights, **_wrong(told), 'hours': hours}
+        return table, {'flights': flights, **_wrong(table), 'hours': hours}
 
     places = {number: (seed, number) for number in range(flights)}
     loops = combinations(seed, flights)

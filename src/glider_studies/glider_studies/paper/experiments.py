@@ -72,7 +72,7 @@ class Case(NamedTuple):
     scenario: str
     changes: dict[str, Any] = {}
     measures: tuple[str, ...] = ('attitude',)
-    told: str = ''  #: vehicle whose steering the PID is told, instead of that of the one it flies
+    steering_of: str = ''  #: vehicle whose steering the PID is given; '': of the one it flies
     facts: dict[str, Any] = {}  #: goes into the row as it is
     drawn: bool = False  #: a record of it is kept for figures
 
@@ -84,11 +84,11 @@ class Case(NamedTuple):
     def command(self) -> str | None:
         """Shell command that flies it again; None if a scenario cannot say it."""
         options = f'--duration full --controller {self.controller} --guidance {self.guidance}'
-        return None if self.told else run_command(self.scenario, self.changes, options)
+        return None if self.steering_of else run_command(self.scenario, self.changes, options)
 
     def key(self) -> str:
         """The same for flights that are one and the same."""
-        return json.dumps([*self[1:5], self.measures, self.told])
+        return json.dumps([*self[1:5], self.measures, self.steering_of])
 
 
 class Experiment(NamedTuple):
@@ -185,7 +185,7 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
         if 'labelled' in one:
             facts[one['labelled']] = names[0]
         scenario = fields.pop('scenario', one.get('scenario', experiment))
-        told = fields.pop('told', '')
+        steering_of = fields.pop('steering_of', '')
         laws = fields.pop('laws', one.get('laws', ['adaptive', 'pid']))
         if 'plant' in fields:
             seed = fields.pop('plant')
@@ -198,7 +198,7 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
         name = one['named'].format(*names) if 'named' in one else ', '.join(names)
         measures = tuple(one.get('measures', ['attitude']))
         cases += [
-            Case(name, law, method, scenario, fields, measures, told, facts, 'drawn' in one)
+            Case(name, law, method, scenario, fields, measures, steering_of, facts, 'drawn' in one)
             for method in one.get('guidance', ['los_current'])
             for law in laws
         ]
@@ -254,8 +254,8 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
     """Fly one case in a worker: its row, and if it is drawn a record thin enough to hand on."""
     scenario = case.load()
     state, params = mission_of(scenario)
-    if case.told:
-        steering = load_vehicle(case.told).steering_rates
+    if case.steering_of:
+        steering = load_vehicle(case.steering_of).steering_rates
         law = params.control.law
         heading = law.heading._replace(steering_dive=steering.dive, steering_climb=steering.climb)
         control = params.control._replace(law=law._replace(heading=heading))
@@ -362,7 +362,7 @@ def pid_better(rows: list[dict]) -> list[dict[str, Any]]:
     return [dict(zip(fields, pair, strict=True)) for pair in pairs if is_better(*pair[3:])]
 
 
-def told(one: Experiment, rows: list[dict]) -> dict[str, Any]:
+def verdict_of(one: Experiment, rows: list[dict]) -> dict[str, Any]:
     """What the paper says, what was flown, and the verdict, of one experiment."""
     checks = one.judge(rows)
     passed = bool(checks) and all(check.passed for check in checks)
@@ -381,4 +381,4 @@ def told(one: Experiment, rows: list[dict]) -> dict[str, Any]:
 
 def report(experiments: list[Experiment], rows: list[list[dict]]) -> dict[str, Any]:
     """Result of the command, over all experiments."""
-    return {'experiments': list(map(told, experiments, rows))}
+    return {'experiments': list(map(verdict_of, experiments, rows))}

@@ -165,7 +165,7 @@ def judge_stays(rows: list[dict]) -> list[Check]:
 def judge_clean(rows: list[dict]) -> list[Check]:
     """Whether the guard had nothing to say, in hours enough, and each flight came to its end."""
     hours = sum(row['hours'] for row in rows if row['status'] == 'completed')
-    told = [
+    events = [
         Check(f'{row["case"]}, {row["controller"]}', event['row'], 'nothing reported', False)
         for row in rows
         for event in row['guard']['events']
@@ -173,8 +173,8 @@ def judge_clean(rows: list[dict]) -> list[Check]:
     enough = Check(
         'hours flown', f'{hours:,.0f} h', f'{LEAST_CLEAN_H:,.0f} h', hours >= LEAST_CLEAN_H
     )
-    reported = Check('reported by the guard', str(len(told)), '0', not told)
-    return [enough, reported, *told, *_not_ended(rows)]
+    reported = Check('reported by the guard', str(len(events)), '0', not events)
+    return [enough, reported, *events, *_not_ended(rows)]
 
 
 def _faults_of(row: dict, deepest_m: float) -> str:

@@ -189,8 +189,8 @@ def show(result: dict[str, Any], output: Console) -> None:
 def _show_search(one: dict[str, Any], output: Console) -> None:
     """Print what random faults did, and the lines that fly it again."""
     counts = one['counts']
-    told = ', '.join(f'{name.replace("_", " ")} {number:,}' for name, number in counts.items())
-    output.print(told, soft_wrap=True)
+    counted = ', '.join(f'{name.replace("_", " ")} {number:,}' for name, number in counts.items())
+    output.print(counted, soft_wrap=True)
     for row in one['rows'][:LISTED]:
         output.print(f'flight {row["flight"]}: {row["kind"]}: {row["why"]}', soft_wrap=True)
         output.print(f'  {row["command"]}', soft_wrap=True)

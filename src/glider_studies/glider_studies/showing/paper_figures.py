@@ -58,13 +58,13 @@ def draw(
         for case, record in zip(one.cases, kept, strict=True)
         if record is not None
     }
-    told = {one.name: flown for one, flown in zip(experiments, rows, strict=True)}
+    rows_of = {one.name: flown for one, flown in zip(experiments, rows, strict=True)}
     files = []
     for drawing in DRAWINGS:
-        if drawing.experiment not in told:
+        if drawing.experiment not in rows_of:
             continue
         figure = new_figure(11.0, 8.0)
-        drawing.draw(figure, drawing, flights, told[drawing.experiment])
+        drawing.draw(figure, drawing, flights, rows_of[drawing.experiment])
         file = folder / f'figure_{drawing.number:02d}.png'
         save_figure(figure, file, dpi=100)
         files.append(file)

@@ -97,8 +97,8 @@ def load_map(file: Path, by: str = 'steady') -> StabilityMap:
             f'{file}: {others[0]} has {len(panels)} values (allowed: <= {MAX_PANELS} panels)'
         )
     first_mps, vehicle = _horizontal_speed(file, data)
-    told = data[others[0]].attrs.get(GLIDE_MPS, first_mps) if others else first_mps
-    glides_mps = np.broadcast_to(told, len(panels))
+    glide_mps = data[others[0]].attrs.get(GLIDE_MPS, first_mps) if others else first_mps
+    glides_mps = np.broadcast_to(glide_mps, len(panels))
     speeds, angles = data[speed].values, data[angle].values
     return StabilityMap(
         title=data.attrs['title'],

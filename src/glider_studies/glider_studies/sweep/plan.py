@@ -377,9 +377,9 @@ def sweep_names() -> list[str]:
 
 
 def _validate(path: Path, values: dict[str, Any] | None = None) -> Sweep:
-    told = {'name': name_after(path)} | (read_yaml(path) if values is None else values)
+    written = {'name': name_after(path)} | (read_yaml(path) if values is None else values)
     lines = {'line_of': partial(yaml_line, path)} if values is None else {}
-    return validate(Sweep, told, str(path), **lines)
+    return validate(Sweep, written, str(path), **lines)
 
 
 def read_sweep(name: str) -> Sweep:

@@ -45,7 +45,7 @@ class Input:
         self.arrived_s = -float('inf')  #: on the clock of the cycles
         self.owner = Owner(topic, lockstep, stand_in)
         self.refused = 0  #: messages of other publishers, and such as cannot be used
-        self.told_refused_s = -float('inf')  #: wall time at which a refusal was told of last
+        self.refusal_shown_s = -float('inf')  #: wall time at which a refusal was told of last
         self.lost = 0  #: messages that lack between those that came
         self.late = 0  #: cycles that had to do with the input of the one before
         self.used_ns = -1
@@ -82,7 +82,7 @@ class Input:
         """Count a message that is refused; whether it is time to tell of it."""
         self.refused += 1
         now_s = time.monotonic()
-        if now_s - self.told_refused_s < _REFUSED_EVERY_S:
+        if now_s - self.refusal_shown_s < _REFUSED_EVERY_S:
             return False
-        self.told_refused_s = now_s
+        self.refusal_shown_s = now_s
         return True

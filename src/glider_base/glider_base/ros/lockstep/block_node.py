@@ -10,7 +10,7 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 
 from glider_base.block import Block, Said, Telling, optional_topics
 from glider_base.errors import EXIT_FAILED
-from glider_base.kernel import compiling_told
+from glider_base.kernel import on_compiling
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.node import TickSettings
 from glider_base.ros.lockstep.peers import FAREWELL_S
@@ -127,7 +127,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         def tell() -> None:
             self.get_logger().info(said)
 
-        with compiling_told(tell):
+        with on_compiling(tell):
             state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
             for order in self.block.orders:
                 order(state)

@@ -79,7 +79,7 @@ def report_array(report: Report) -> DiagnosticArray:
     return array
 
 
-class Told(NamedTuple):
+class EventCount(NamedTuple):
     """How many events a node has told of up to a tick: without them a recording is not whole."""
 
     node: str  #: full name
@@ -88,19 +88,19 @@ class Told(NamedTuple):
     process: str = ''
 
 
-def told_array(told: Told) -> DiagnosticArray:
-    """Message that carries ``told``."""
-    array = status_array(told.stamp_ns, told.node, OK, '', {'events': told.events})
-    array.status[0].hardware_id = told.process
+def count_array(count: EventCount) -> DiagnosticArray:
+    """Message that carries ``count``."""
+    array = status_array(count.stamp_ns, count.node, OK, '', {'events': count.events})
+    array.status[0].hardware_id = count.process
     return array
 
 
-def told_in(array: DiagnosticArray) -> Told | None:
+def count_in(array: DiagnosticArray) -> EventCount | None:
     """What a message carries; None if it is of somebody else."""
     try:
         (status,) = array.status
         (pair,) = status.values
-        return Told(status.name, int(pair.value), stamp_of(array), status.hardware_id)
+        return EventCount(status.name, int(pair.value), stamp_of(array), status.hardware_id)
     except ValueError:
         return None
 

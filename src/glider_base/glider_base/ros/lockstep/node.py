@@ -97,7 +97,7 @@ class TickNode(Node):
         self._events, self._reports = self._publisher(events), self._publisher(reports)
         self.outputs[events.name] = (events, self._events)
         self._pulse = health.Pulse(self, self._publisher(events._replace(qos=qos.REPEATED)))
-        self._event_counts, self.events_told = self._publisher(TOPICS['told']), 0
+        self._event_counts, self.events_reported = self._publisher(TOPICS['told']), 0
         self._reports_in = self._subscription(reports, self._on_reports, raw=False)
         self.gate.awaited.add(self._reports_in)
         self._awaited = None
@@ -178,7 +178,7 @@ class TickNode(Node):
 
     def publish_event(self, array) -> None:
         """Put a DiagnosticArray on /diagnostics."""
-        self.events_told += 1
+        self.events_reported += 1
         self._events.publish(to_cdr(array))
 
     def condition(self) -> Said:
@@ -188,8 +188,8 @@ class TickNode(Node):
     def count_events(self, stamp_ns: int) -> None:
         """Tell the recorder how many events there were up to a tick, so that it has them all."""
         name = self.get_fully_qualified_name()
-        told = health.Told(name, self.events_told, stamp_ns, self.process)
-        self._event_counts.publish(to_cdr(health.told_array(told)))
+        count = health.EventCount(name, self.events_reported, stamp_ns, self.process)
+        self._event_counts.publish(to_cdr(health.count_array(count)))
 
     def report(self, phase: str, message: str = '', **fields) -> None:
         """Tell the peers how this node is, and everybody if it is not well."""

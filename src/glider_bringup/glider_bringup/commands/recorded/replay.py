@@ -12,7 +12,7 @@ from glider_bringup.console import (
     STATE,
     Json,
     Run,
-    interrupted_told,
+    interrupt_shown,
     output,
     progress_bar,
     tell,
@@ -65,7 +65,7 @@ def replay(
         tell(bag.cut)
     span_s = (plan.end_ns - plan.start_ns) / 1e9
     bar = progress_bar('replaying', max(span_s, 1e-9), STATE, REMAINING)
-    with interrupted_told(), work.replay(plan, factor) as player, bar as show:
+    with interrupt_shown(), work.replay(plan, factor) as player, bar as show:
 
         def update(passed_s: float) -> None:
             show(completed=passed_s, state=f'{passed_s:,.1f} of {span_s:,.1f} s')

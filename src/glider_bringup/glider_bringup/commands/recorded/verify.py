@@ -16,7 +16,7 @@ from glider_bringup.console import (
     Json,
     Run,
     compiling,
-    interrupted_told,
+    interrupt_shown,
     output,
     picked,
     print_table,
@@ -48,33 +48,33 @@ def verify(
 
     Exit code 1, and the first tick, topic and field that differ, unless all of them are identical.
     """
-    from glider_base.kernel import compiling_told
+    from glider_base.kernel import on_compiling
     from glider_bringup.engines.interrupts import interrupts_noted
     from glider_mission.recording.mcap_reader import Bag
+    from glider_mission.recording.ros.node_settings import read_settings
     from glider_mission.recording.ros.recorded_run import Recording
-    from glider_mission.recording.ros.told import read_told
     from glider_mission.recording.ros.verify.every_block import report as report_of
     from glider_mission.recording.ros.verify.every_block import verify as verify_blocks
 
     wanted = picked(only, BlockName)
-    told_compiling = partial(
+    compiling_shown = partial(
         compiling, 'compiling the mathematics of a block for these settings, once'
     )
-    with interrupted_told(), tempfile.TemporaryDirectory() as scratch, shares() as update:
+    with interrupt_shown(), tempfile.TemporaryDirectory() as scratch, shares() as update:
         bag = Bag(run)
-        told = read_told(bag, run, settings, Path(scratch))
+        given = read_settings(bag, run, settings, Path(scratch))
         recording = Recording(
-            bag, namespace, lambda share: update('reading', share), told.steers_by
+            bag, namespace, lambda share: update('reading', share), given.steers_by
         )
-        with interrupts_noted() as noted, compiling_told(told_compiling):
+        with interrupts_noted() as noted, on_compiling(compiling_shown):
 
             def go_on(*done) -> None:
                 update(*done)
                 if noted:
                     raise KeyboardInterrupt
 
-            verdicts = list(verify_blocks(recording, told, wanted, go_on))
-    report = report_of(bag, recording, told, verdicts)
+            verdicts = list(verify_blocks(recording, given, wanted, go_on))
+    report = report_of(bag, recording, given, verdicts)
     if as_json:
         print(json.dumps({'run': str(run), **report}))
     else:

@@ -86,7 +86,7 @@ class LogWriter:
     def _tell_orders(self, tick: int, orders: list[Order]) -> None:
         """Write the orders that hold from a tick on: one event of a kind, and one path."""
         stamp_ns = tick * TICK_NS
-        path, told = self._settings.path, {}
+        path, held = self._settings.path, {}
         for order in orders:
             before, message = self._settings, ABORT if order.abort else PARAMETERS_SET
             try:
@@ -95,11 +95,11 @@ class LogWriter:
                 event = health.status_array(stamp_ns, _GUIDANCE, health.WARN, refused(error), {})
                 self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
                 continue
-            values = told.setdefault(message, {})
+            values = held.setdefault(message, {})
             values.update(changed_parameters(before, self._settings))
         if self._settings.path != path:
             self._tell_path(stamp_ns)
-        for message, values in told.items():
+        for message, values in held.items():
             event = health.status_array(stamp_ns, _GUIDANCE, health.OK, message, values)
             self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
 

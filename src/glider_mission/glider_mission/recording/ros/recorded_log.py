@@ -239,11 +239,11 @@ class RecordedLog:
         if ticks is None and self.end:
             ticks = self.end.stamp_ns // TICK_NS + 1
             unsure = 0 if self.end.phase == health.FINISHED else 2
-        told = [self._bag.cut] if self._bag.cut else []
+        lacking = [self._bag.cut] if self._bag.cut else []
         if ticks is not None and self.ticks < ticks - unsure:
-            told.append(f'{self.ticks:,} of {ticks:,} ticks are there')
-            told += [] if self._bag.cut else [self.lacks]
-        return '; '.join(told)
+            lacking.append(f'{self.ticks:,} of {ticks:,} ticks are there')
+            lacking += [] if self._bag.cut else [self.lacks]
+        return '; '.join(lacking)
 
     def lost(self, complete: bool) -> int:
         """Number of per-tick messages that ought to be recorded but are not.

@@ -151,10 +151,10 @@ def qos_of(topic: BagTopic) -> QoSProfile:
 def _profile(profile: dict) -> tuple[int, ReliabilityPolicy, DurabilityPolicy]:
     def policy(name: str, unknown):
         """What is told, of the kind of that which is taken where nothing known is."""
-        kind, told = type(unknown), profile.get(name, 0)
-        if isinstance(told, int):
-            return kind(told) if told in (1, 2) else unknown
-        return kind.__members__.get(told.upper(), unknown)
+        kind, value = type(unknown), profile.get(name, 0)
+        if isinstance(value, int):
+            return kind(value) if value in (1, 2) else unknown
+        return kind.__members__.get(value.upper(), unknown)
 
     keeps_all = policy('history', HistoryPolicy.KEEP_LAST) is HistoryPolicy.KEEP_ALL
     return (
@@ -245,11 +245,11 @@ class _Count:
             topic.message_type, topic.full_name(namespace), topic.qos
         )
         self._name = node.get_fully_qualified_name()
-        self._events, self._newest_ns, self._told_ns = 0, -TICK_NS, -TICK_NS
+        self._events, self._newest_ns, self._reported_ns = 0, -TICK_NS, -TICK_NS
 
     def add(self, log_ns: int, name: str) -> None:
         """Count a message of a topic; what there was is told now and then, when a tick is over."""
-        since_ns = abs(self._newest_ns - self._told_ns)
+        since_ns = abs(self._newest_ns - self._reported_ns)
         if log_ns != self._newest_ns and since_ns >= COUNT_TICKS * TICK_NS:
             self.tell()
         self._newest_ns = log_ns
@@ -257,9 +257,9 @@ class _Count:
 
     def tell(self) -> None:
         """Say how many events there were up to what was published last."""
-        self._told_ns = self._newest_ns
-        told = health.Told(self._name, self._events, self._newest_ns)
-        self.publisher.publish(to_cdr(health.told_array(told)))
+        self._reported_ns = self._newest_ns
+        tally = health.EventCount(self._name, self._events, self._newest_ns)
+        self.publisher.publish(to_cdr(health.count_array(tally)))
 
 
 @contextmanager

@@ -61,10 +61,10 @@ class GridFileSettings(Settings):
         if self.fingerprint:
             self.known()
         try:
-            told = os.stat(self.file)
+            status = os.stat(self.file)
         except OSError:  # who reads it says so
             return 0, 0
-        return told.st_mtime_ns, told.st_size
+        return status.st_mtime_ns, status.st_size
 
     def loaded(self) -> tuple[Loaded, float]:
         """What a mission needs of its file, and its start (s since 1970); errors as `load`."""
@@ -90,16 +90,16 @@ class GridFileSettings(Settings):
         latitudes, longitudes = loaded.axes[2:]
         for place in places:
             at = _beside(place, self.mission.origin.longitude_deg)
-            told = f'file {self.file}: {place[0]:.4f}, {place[1]:.4f} {what} is'
+            where = f'file {self.file}: {place[0]:.4f}, {place[1]:.4f} {what} is'
             axes = zip(at, (latitudes, longitudes), strict=True)
             if not all(axis[0] - EDGE_DEG <= one <= axis[-1] + EDGE_DEG for one, axis in axes):
                 raise ConfigurationError(
-                    f'{told} beyond what is read of it (allowed: within {latitudes[0]:.3f} to '
+                    f'{where} beyond what is read of it (allowed: within {latitudes[0]:.3f} to '
                     f'{latitudes[-1]:.3f}, {longitudes[0]:.3f} to {longitudes[-1]:.3f}, around '
                     'the path as far as it has water)'
                 )
             if self.is_land(loaded, at):
-                raise ConfigurationError(f'{told} land (allowed: water)')
+                raise ConfigurationError(f'{where} land (allowed: water)')
 
     def params(self) -> 'GridParams':
         """Kernel parameters: what was read of the file.

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What faults do to what the vehicle tells: its sensors, and those of its own health.
 
-`told` is a slot, whose body without faults hands on what it is given.
+`with_faults` is a slot, whose body without faults hands on what it is given.
 """
 
 import math
@@ -37,7 +37,7 @@ _METRES_PER_DEG = 111195.0
 
 @slot
 @default
-def told(numbers, state, sensors, params):
+def with_faults(numbers, state, sensors, params):
     """Numbers of the topics of a tick, in the order of the plant's outputs, as faults make them.
 
     ``numbers`` are as without. ``state`` is that of the plant.
@@ -45,9 +45,9 @@ def told(numbers, state, sensors, params):
     return numbers
 
 
-@told.body(FaultParams)
+@with_faults.body(FaultParams)
 @kernel
-def _told(numbers, state, sensors, params):
+def _with_faults(numbers, state, sensors, params):
     faults = begun(state, params)
     if not any_begun(faults):
         return numbers

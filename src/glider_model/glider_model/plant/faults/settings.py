@@ -101,12 +101,12 @@ class FaultSettings(Settings):
     @property
     def words(self) -> str:
         """What it is, in a few words."""
-        told = ', '.join(
+        unusual = ', '.join(
             value if isinstance(value, str) else f'{name} {value:g}'
             for name, value in self.own.items()
             if value != type(self).model_fields[name].default
         )
-        return f'{self.kind}: {told}' if told else self.kind
+        return f'{self.kind}: {unusual}' if unusual else self.kind
 
     @property
     def when(self) -> str:

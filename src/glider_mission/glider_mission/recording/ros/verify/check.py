@@ -211,11 +211,11 @@ class Check:
             self.notes.append('/diagnostics is not recorded')
             return
         end_ns = int(self.stamps_ns[self.ticks - 1])
-        told = [(array, to_cdr(array)) for array in expected]
+        made = [(array, to_cdr(array)) for array in expected]
         recorded = [(event, event.raw) for event in self.recording.events]
-        missing = _unmatched(told, recorded)
-        self.compared['/diagnostics'] += len(told) - len(missing)
-        rest = [event for event, _ in _unmatched(recorded, told)]
+        missing = _unmatched(made, recorded)
+        self.compared['/diagnostics'] += len(made) - len(missing)
+        rest = [event for event, _ in _unmatched(recorded, made)]
         for array, raw in missing:
             at_ns = health.stamp_of(array)
             alike = (e for e in rest if len(e.raw) == len(raw) and _alike(e.raw, raw))
@@ -239,8 +239,8 @@ class Check:
         if block.wired == wiring.GUIDANCE:
             self.compare_paths()
         if block.say:
-            told = Telling(block, int(stamps_ns[0])).among(flags, stamps_ns)
-            said = ((int(stamps_ns[i]), block.say(*flags[i].tolist())) for i in told)
+            ticks = Telling(block, int(stamps_ns[0])).among(flags, stamps_ns)
+            said = ((int(stamps_ns[i]), block.say(*flags[i].tolist())) for i in ticks)
             arrays = [health.said_array(stamp_ns, node, one) for stamp_ns, one in said]
             self.compare_events(arrays, lambda e: e.node == node and block.flags[0] in e.values)
         elif block is PLANT:

@@ -19,16 +19,16 @@ from glider_base.wiring import WHEN_SILENT, WIRING, Wired, present, publisher
 from glider_mission.blocks import BLOCKS
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
+from glider_mission.recording.ros.node_settings import NodeSettings
 from glider_mission.recording.ros.recorded_run import Recording
-from glider_mission.recording.ros.told import Told
 from glider_mission.recording.ros.verify.check import DIFFERENT, IDENTICAL, SKIPPED, Verdict
 from glider_mission.recording.ros.verify.free_running import free_running
 from glider_mission.recording.ros.verify.lockstep import in_lockstep
 
 
-def is_lockstep(recording: Recording, told: Told) -> bool:
+def is_lockstep(recording: Recording, given: NodeSettings) -> bool:
     """Whether the nodes kept step: as they were told or, if nobody says, by what it looks like."""
-    return _keeps_step(recording) if told.lockstep is None else told.lockstep
+    return _keeps_step(recording) if given.lockstep is None else given.lockstep
 
 
 def _keeps_step(recording: Recording) -> bool:
@@ -58,23 +58,26 @@ def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool
 
 
 def verify(
-    recording: Recording, told: Told, only: list[str], progress: Callable[[str, float], None]
+    recording: Recording,
+    given: NodeSettings,
+    only: list[str],
+    progress: Callable[[str, float], None],
 ) -> Iterator[Verdict]:
     """Compare the blocks of a recording, all or only some, in the order in which they act.
 
     ``progress`` is called now and then with a block's name and the share that is done, 0 to 1.
     """
-    lockstep = is_lockstep(recording, told)
+    lockstep = is_lockstep(recording, given)
     for block in BLOCKS:
         name = block.wired.name
         if only and name not in only:
             continue
-        settings = told.blocks[name]
+        settings = given.blocks[name]
         reason = _reason_to_skip(block.wired, settings, recording, lockstep)
         if reason:
             yield Verdict(name, SKIPPED, reason)
             continue
-        work = in_lockstep if lockstep else partial(free_running, max_age_s=told.max_age_s)
+        work = in_lockstep if lockstep else partial(free_running, max_age_s=given.max_age_s)
         recorded = RecordedBlock(block, settings)
         try:
             yield work(recorded, recording, progress=partial(progress, name))
@@ -82,9 +85,9 @@ def verify(
             yield Verdict(name, DIFFERENT, notes=[f'not computed: {raised(error)}'])
 
 
-def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) -> dict:
+def report(bag: Bag, recording: Recording, given: NodeSettings, verdicts: list[Verdict]) -> dict:
     """Verdicts as one JSON object, with hints for whoever looks for a cause."""
-    lockstep = is_lockstep(recording, told)
+    lockstep = is_lockstep(recording, given)
     compared = [verdict for verdict in verdicts if verdict.result != SKIPPED]
     notes = [bag.cut] if bag.cut else []
     if not compared:
@@ -96,7 +99,7 @@ def report(bag: Bag, recording: Recording, told: Told, verdicts: list[Verdict]) 
         )
     return {
         'identical': bool(compared) and all(one.result == IDENTICAL for one in compared),
-        'settings': told.source,
+        'settings': given.source,
         'lockstep': lockstep,
         'namespace': recording.namespace,
         'blocks': [_block_report(one, verdicts) for one in verdicts],

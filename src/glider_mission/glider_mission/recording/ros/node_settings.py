@@ -18,7 +18,7 @@ from glider_mission.scenario import Scenario, load_scenario
 OLD_S = TickSettings().input_max_age_s
 
 
-class Told(NamedTuple):
+class NodeSettings(NamedTuple):
     """What the nodes of a recorded run were told."""
 
     blocks: dict[str, Settings | None]  #: by name of the block; None: it is not known
@@ -35,7 +35,7 @@ class Told(NamedTuple):
         return next(filter(None, names), '')
 
 
-def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
+def read_settings(bag: Bag, path: Path, file: Path | None, scratch: Path) -> NodeSettings:
     """Settings of the blocks of a recorded run, whose bag was found at ``path``.
 
     A scenario.yaml that lies there counts, else the one attached; instead of both a scenario or
@@ -49,10 +49,12 @@ def read_told(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Told:
         values = read_yaml(file)
         if _sections(values):
             return _from_parameters(values, str(file))
-        return Told(_from_scenario(load_scenario(str(file), recorded=True)), str(file), *how)
+        return NodeSettings(
+            _from_scenario(load_scenario(str(file), recorded=True)), str(file), *how
+        )
     found = find_scenario(bag.files[0], folder, bag.attachments, scratch)
     if found is not None:
-        return Told(_from_scenario(found.scenario), found.source, *how)
+        return NodeSettings(_from_scenario(found.scenario), found.source, *how)
     if parameters.is_file():
         return _from_parameters(read_yaml(parameters), str(parameters))
     raise ConfigurationError(
@@ -79,20 +81,20 @@ def _how(values: dict) -> tuple[bool | None, float]:
     """How the nodes of a parameter file act: whether in step, and when an input is old (s)."""
     sections = _sections(values).values()
 
-    def told(name: str, kind: type) -> list:
+    def of_all(name: str, kind: type) -> list:
         return [one for section in sections if isinstance(one := section.get(name), kind)]
 
-    in_step = told('lockstep', bool)
-    return all(in_step) if in_step else None, max(told('input_max_age_s', float), default=OLD_S)
+    in_step = of_all('lockstep', bool)
+    return all(in_step) if in_step else None, max(of_all('input_max_age_s', float), default=OLD_S)
 
 
-def _from_parameters(values: dict, source: str) -> Told:
+def _from_parameters(values: dict, source: str) -> NodeSettings:
     sections = _sections(values)
     found: dict[str, Settings | None] = {}
     for block in BLOCKS:
         node = block.wired.node
         given = {**sections.get('**', {}), **sections.get(node, {})}
-        told = node in sections or '**' in sections
-        settings = from_parameters(block.settings, given, f'{source}: {node}') if told else None
+        known = node in sections or '**' in sections
+        settings = from_parameters(block.settings, given, f'{source}: {node}') if known else None
         found[block.wired.name] = settings
-    return Told(found, source, *_how(values))
+    return NodeSettings(found, source, *_how(values))
