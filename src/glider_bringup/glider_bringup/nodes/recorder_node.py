@@ -104,7 +104,7 @@ class RecorderNode(TickNode):
         self._subscription(TOPICS['path'], self.on_path, gated=False)
         self.events = self._subscription(TOPICS['/diagnostics'], self.on_event, raw=False)
         self.counts = self._subscription(TOPICS['told'], self.on_count, raw=False)
-        self.counted: dict[str, health.Told] = {}
+        self.counted: dict[str, health.EventCount] = {}
         signal.signal(signal.SIGINT, self.on_signal)
         signal.signal(signal.SIGTERM, self.on_signal)
         self.wall_timer(_DRAIN_S, self.drain)
