@@ -123,13 +123,14 @@ def _follow(model: type[pydantic.BaseModel], location: tuple):
     """
     path, holders, inside, field = [], [model], [model], None
     for part in location:
-        tagged = [one for one in inside if _has_tag(one, part)] if len(inside) > 1 else []
-        if tagged:
+        is_key = field is not None and get_origin(field.annotation) is dict
+        tagged = [one for one in inside if _has_tag(one, part)]
+        if tagged and len(inside) > 1 and not is_key:
             inside = tagged
             continue
         path.append(str(part))
         holders = inside
-        field = _field(holders, part)
+        field = None if is_key else _field(holders, part)
         if field is not None:
             inside = _models(field.annotation)
     return path, holders, field
@@ -139,12 +140,10 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
     """Say in words what the field of an error would accept."""
     context = error.get('ctx') or {}
     if error['type'] == 'extra_forbidden':
-        names = ', '.join(name for m in holders for name in m.model_fields)
         extras = (model.model_config.get('json_schema_extra') for model in holders)
-        return f'allowed fields: {names}' + ''.join(map(_others, extras))
+        return _fields(holders) + ''.join(map(_others, extras))
     if error['type'] in _NOT_A_MAPPING:
-        models = _models(field.annotation) if field is not None else holders
-        return f'allowed fields: {", ".join(name for m in models for name in m.model_fields)}'
+        return _fields(_models(field.annotation) if field is not None else holders)
     for key in ('expected', 'expected_tags'):
         if key in context:
             extra = field.json_schema_extra if field is not None else None
@@ -152,6 +151,12 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
     found = (field is not None and limits(field)) or context
     bounds = [f'{word} {found[key]}' for key, word in BOUNDS.items() if key in found]
     return f'allowed: {" and ".join(bounds)}' if bounds else ''
+
+
+def _fields(models: list[type[pydantic.BaseModel]]) -> str:
+    """Say in words what fields models have, each once."""
+    names = dict.fromkeys(name for model in models for name in model.model_fields)
+    return f'allowed fields: {", ".join(names)}'
 
 
 def limits(field: pydantic.fields.FieldInfo) -> dict[str, float]:

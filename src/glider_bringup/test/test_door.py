@@ -348,6 +348,10 @@ SPEEDS = {'current.speed_kn': [0.0]}
         (lambda: glider.fly(out=3), 'out = 3: not usable (allowed: a path)'),
         (lambda: glider.fly(out='a\0'), "out = 'a\\x00': not usable (allowed: a path)"),
         (
+            lambda: glider.fly(set={'path': 3}),
+            'course_deg, length_m, waypoints, waypoints_latlon, c',
+        ),
+        (
             lambda: glider.fly(set=[]),
             'set = []: not usable (allowed: values by dotted field name)',
         ),

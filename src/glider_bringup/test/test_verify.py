@@ -19,6 +19,7 @@ from mcap.writer import CompressionType
 from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
+import glider_bringup as glider
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
@@ -309,6 +310,15 @@ def test_stamps_that_rot_in_a_topic_are_no_ticks_of_the_others(altered, beginnin
         for one in beginning
     ]
     assert different(results(altered(messages), tmp_path)) == {'plant', 'guard'}
+
+
+def test_a_stamp_that_rots_costs_no_other_topic_a_tick(altered, beginning):
+    (place, *_) = (i for i, m in enumerate(beginning) if m.topic == '/glider/battery')
+    messages = list(beginning)
+    messages[place] = moved(messages[place], 10**15, messages[place].log_ns)
+    data = glider.open_run(altered(messages)).to_xarray()
+    assert data.sizes['time'] == 400
+    assert np.flatnonzero(np.isnan(data.battery_voltage)).tolist() == [0]
 
 
 @pytest.mark.filterwarnings('error')

@@ -241,6 +241,14 @@ MISTAKES = {
         ['dimensions.x.values', 'nan'],
     ),
     'given twice': (one(kind='values', field='seed', values=[1, 2, 1]), ['given twice: 1']),
+    'called like a field': (
+        {'dimensions': {'seed': {'kind': 'values', 'field': 'seed', 'values': [1, 1]}}},
+        ['dimensions.seed.values = [1, 1]'],
+    ),
+    'called like a kind': (
+        {'dimensions': {'grid': {'kind': 'values', 'field': 'seed', 'values': [1, 1]}}},
+        ['dimensions.grid.values = [1, 1]'],
+    ),
     'of two kinds': (one(kind='values', field='seed', values=[1, 'a']), ['numbers and text']),
     'grid backwards': (
         one(kind='grid', field='seed', start=2, stop=1, step=1),
