@@ -104,7 +104,8 @@ def test_drawn_from_the_bag_alone(bag_only):
     [
         ([said(health.FINISHED, 2 * TICK_NS)], 'completed', ''),
         ([said(health.FAILED, 2 * TICK_NS, 'control_node is late')], 'aborted', 'control_node is'),
-        ([], 'aborted', 'stopped before'),
+        ([said(health.READY, TICK_NS)], 'aborted', 'stopped before'),
+        ([], 'aborted', 'nobody knows how it ended'),
     ],
 )
 def test_status_is_what_the_plant_said_last(tmp_path, reports, status, words):
