@@ -94,7 +94,7 @@ class AdaptiveState(NamedTuple):
     roll_integral: tuple[float, float]  #: in dive and climb (N m)
     pitch_integral: tuple[float, float]
     steering: Steering
-    is_down: bool  #: in a dive
+    is_down: bool  #: in a dive; that ends at the surface, where the law is not asked
 
 
 @kernel
@@ -113,9 +113,8 @@ def adaptive_step(state, seen, params, dt):
     """Roll and pitch moment (N m): see `law_step`."""
     params = bank_carefully(seen.m_b, params)
     now, wanted = seen.measured, seen.reference
-    down, steering = now.vertical_rate > 0.0, state.steering
-    if down != state.is_down:  # at the surface it was not asked: no glide of before goes on
-        steering = replace(steering, steady_s=0.0)
+    down = now.vertical_rate > 0.0
+    steering = state.steering if down == state.is_down else replace(state.steering, steady_s=0.0)
     steering = learn(steering, now, seen.speed, params.steering, dt)
     command = 0.0
     if steering.steady_s > 0.0:

@@ -206,10 +206,9 @@ def learn(steering, measured, speed, params, dt):
     yaw_rate = steering.yaw_rate + share * (measured.psi_dot - steering.yaw_rate)
     dive, climb = steering.dive, steering.climb
     if params.bank > 0.0 and steady_s > params.after_s:
-        flown = dive if down else climb
-        flown = learn_steering(flown, sine, cube, sine_rate, yaw_rate, params, dt)
-        flown = choose_steering(flown, sine / ratio, params.bank)
-        dive, climb = (flown, climb) if down else (dive, flown)
+        new = learn_steering(dive if down else climb, sine, cube, sine_rate, yaw_rate, params, dt)
+        new = choose_steering(new, sine / ratio, params.bank)
+        dive, climb = (new, climb) if down else (dive, new)
     return Steering(dive, climb, sine, cube, sine_rate, yaw_rate, steady_s, ratio)
 
 
