@@ -122,16 +122,6 @@ def test_a_plan_counts_what_is_pumped_as_the_nose_goes_over_and_a_dive_that_is_b
     assert planned(scenario).wh == pytest.approx(flown['energy']['wh'], rel=0.05)
 
 
-def test_a_plan_counts_for_how_long_a_vehicle_floats_until_its_pump_has_made_it_heavy():
-    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 3_000.0, 'at_end': 'stop'}
-    yo = {'profile.depth_m': 100.0, 'profile.net_heaviness_kg': 0.57, 'profile.pitch_deg': 36.0}
-    yo |= {'profile.surface_every_dives': 1, 'dives': 0, 'duration_s': 2e5}
-    yo |= {'current.speed_kn': 0.0}
-    scenario = load_scenario('current_8deg', {'vehicle': 'seawing', 'path': path, **yo})
-    flown = glider.fly(scenario).score['arrival']['t_s']
-    assert planned(scenario).arrival_s(50.0) == pytest.approx(flown, rel=0.03)
-
-
 @pytest.mark.parametrize(
     ('fields', 'note'),
     [

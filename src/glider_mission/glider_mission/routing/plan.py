@@ -19,7 +19,7 @@ from glider_model.ocean.bottom import FlatBottom, bottom_depth, least_height
 from glider_model.ocean.density import immersed
 from glider_model.onboard.command_filter import Filtered, filter_angle
 from glider_model.onboard.glide_polar import glide_net_heaviness
-from glider_model.vehicle.file import Vehicle, load_vehicle
+from glider_model.vehicle.file import load_vehicle
 
 #: A route is straightened where that moves it by less than this (m).
 _STRAIGHT_M = 1000.0
@@ -108,13 +108,6 @@ def pace_of(scenario: Scenario) -> Pace:
     turns = dives - (every > 0)  # that are not at the surface
     glide_s = 2.0 * (dives * profile.depth - turns * profile.top_depth) / profile.glide_rate
     cycle_s = glide_s + 2.0 * dives * profile.lead_s + stay_s
-    if every:
-        vehicle = load_vehicle(scenario.vehicle)
-        pump_kgps = vehicle.slowest_pump_rate(0.0)
-        let_in_s = profile.prepare_ticks * TICK_S - 2.0 * _over_kg(params, vehicle) / pump_kgps
-        # it floats until that is let in with which it climbed, and sinks as its root then
-        floats_s = max(0.0, profile.climb_net_heaviness / pump_kgps - let_in_s)
-        cycle_s += floats_s + profile.net_heaviness / pump_kgps / 3.0 - profile.lead_s
     speed = _HELD_SHARE * glide_s * params.profile_speed / cycle_s
     cycle_wh, dive_wh = _energy(scenario, params, cycle_s, stay_s)
     return Pace(speed, cycle_s, stay_s / cycle_s, cycle_wh, dives, dive_wh)
@@ -146,30 +139,28 @@ def _energy(
     costs = np.maximum(0.0, energy.out + energy.out_per_m * levels) + max(0.0, energy.let_in)
     dives, call, top = max(1, profile.surface_every), 0.0, 0.0
     if stay_s:
-        top = _over_kg(params, vehicle) * costs[0]
+        over_kg = min(_over_kg(params, vehicle.slowest_pump_rate(0.0)), body.m_b_max + rising[0])
+        top = max(0.0, over_kg) * costs[0]
         call = energy.call_start + energy.call * min(energy.call_s, stay_s)
     hotel = 0.5 * (energy.dive + energy.climb) * (cycle_s - stay_s) + energy.surface * stay_s
     flat = (dives * out_kg.sum() * costs[0] + top + call) / dives
     return (dives * out_kg @ costs[1:] + top + call + hotel) / 3600.0, flat / 3600.0
 
 
-def _over_kg(params: GuidanceParams, vehicle: Vehicle) -> float:
+def _over_kg(params: GuidanceParams, pump_kgps: float) -> float:
     """What is pumped out (kg) beyond a climb's before a dive, as the nose goes over.
 
     The pump follows, at its rate, the weight of the climb at the pitch that is asked for. That of
     a shallow one is more.
     """
-    pitch, step = (
-        Filtered(params.profile.climb_pitch, 0.0),
-        vehicle.slowest_pump_rate(0.0) * TICK_S,
-    )
+    pitch, step = Filtered(params.profile.climb_pitch, 0.0), pump_kgps * TICK_S
     heavy = climb = glide_net_heaviness(pitch.value, -params.profile.climb_rate, params.polar)
     for _ in range(params.profile.prepare_ticks):
         pitch = filter_angle(pitch, -params.profile.pitch, 0.0, params.pitch_filter, TICK_S)
         wanted = glide_net_heaviness(pitch.value, -params.profile.climb_rate, params.polar)
         if wanted > heavy:
             break
-        heavy = max(wanted, heavy - step, -vehicle.params().m_b_max)
+        heavy = max(wanted, heavy - step)
     return climb - heavy
 
 
