@@ -9,7 +9,7 @@ import xarray
 
 from glider_studies import bottoms
 from glider_studies.bottoms import CLEARANCE, FIRST, WITHOUT, fly_one, write_bottom
-from glider_studies.paper.experiments import fly, told
+from glider_studies.paper.experiments import fly, verdict_of
 
 #: A bottom that a yo to 200 m touches.
 TOUCHED = FIRST
@@ -52,6 +52,6 @@ def test_what_fails_the_study(kept, hit, verdict):
             return {key: {**flown, **changes[key[-1][-1]]} for key in tasks}
 
     one = bottoms.experiment(0)
-    entry = json.loads(json.dumps(told(one, *fly([one], Pool(), None)[0])))
+    entry = json.loads(json.dumps(verdict_of(one, *fly([one], Pool(), None)[0])))
     assert entry['verdict'] == verdict
     assert [row['bottoms'] for row in entry['rows']] == [bottoms.COUNT] * 2

@@ -6,7 +6,7 @@ import numba
 import pytest
 
 from glider_bringup.engines import direct
-from glider_bringup.engines.compiling import compile_loops, told
+from glider_bringup.engines.compiling import compile_loops, shown_once
 from glider_bringup.engines.flight import mission_of
 from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import load_scenario, scenario_names
@@ -50,11 +50,11 @@ def test_loop_depends_on_law_and_methods_alone():
 
 def test_line_names_law_and_method():
     lines = []
-    with told(Combination('pid', 'los_zhang2021'), lines.append):
+    with shown_once(Combination('pid', 'los_zhang2021'), lines.append):
         numba.njit(lambda x: x + 1.0)(1.0)
     (line,) = lines
     assert 'law pid with method los_zhang2021' in line
-    with told(Combination('pid', 'los_zhang2021', steered='slocum_g2'), lines.append):
+    with shown_once(Combination('pid', 'los_zhang2021', steered='slocum_g2'), lines.append):
         numba.njit(lambda x: x + 2.0)(1.0)
     assert 'vehicle slocum_g2' in lines[-1]
 

@@ -10,7 +10,7 @@ import pytest
 from glider_model.ocean.eddying_sea import EddyingSea, currents, write_sea
 from glider_studies import forecasts
 from glider_studies.forecasts import CASES, ERRORS, PERSISTENCE, WAYS, judge, scenario_in
-from glider_studies.paper.experiments import fly, told
+from glider_studies.paper.experiments import fly, verdict_of
 
 
 def rows(**shares):
@@ -48,7 +48,7 @@ def test_the_study_can_be_printed_as_json():
             return {key: [10.0, 20.0, 30.0] for key in tasks}
 
     one = forecasts.experiment(0)
-    entry = json.loads(json.dumps(told(one, *fly([one], Pool(), None)[0])))
+    entry = json.loads(json.dumps(verdict_of(one, *fly([one], Pool(), None)[0])))
     assert entry['verdict'] == 'passed'
     assert {(row['surfacings'], row['p50_m']) for row in entry['rows']} == {(12, 20.0)}
     assert [check['value'] for check in entry['checks']] == [1.0] * (2 * len(ERRORS))
