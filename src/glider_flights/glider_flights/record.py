@@ -209,10 +209,10 @@ def at_times(
     order = np.argsort(own_s[good], kind='stable')
     own_s, values = own_s[good][order], values[good][order]
     found = np.interp(time_s, own_s, values, left=math.nan, right=math.nan)
-    reported_s = np.union1d(own_s, idle_s)
-    after = np.searchsorted(reported_s, time_s).clip(1, None)
-    lasts_s = np.append(reported_s, math.inf)[after] - reported_s[after - 1]
-    return np.where((lasts_s > gap_s) & ~np.isin(time_s, reported_s), math.nan, found)
+    known_s = np.union1d(own_s, idle_s)
+    after = np.searchsorted(known_s, time_s).clip(1, None)
+    lasts_s = np.append(known_s, math.inf)[after] - known_s[after - 1]
+    return np.where((lasts_s > gap_s) & ~np.isin(time_s, known_s), math.nan, found)
 
 
 def angles_at_times(
