@@ -147,6 +147,33 @@ def test_a_mission_that_begins_under_water_flies_its_dives(begins_m, depth_m):
     assert (run.score['status'], run.score['dives']) == ('completed', 2)
 
 
+def test_who_cannot_steer_has_not_completed_its_survey():
+    """Its time is ample, and it ends 2 km away; without the fault it arrives."""
+    stuck = {'kind': 'stuck', 'actuator': 'roll_mass', 'at_s': 1000.0}
+    score = glider.fly('survey', {'faults': [stuck]}).score
+    missed = f'{score["arrival"]["missed_m"]:,.0f} m from its last point'
+    assert score['arrival']['missed_m'] > 1000.0
+    assert score['status'] == 'unfinished'
+    assert f'not at the end of its path, for which there was time: {missed}' in score['reason']
+    short = glider.fly('survey', {'faults': [stuck], 'duration_s': 12000.0}).score
+    assert (short['status'], short['arrival']['arrived']) == ('completed', False)
+
+
+def test_who_comes_up_abeam_of_its_last_point_but_far_from_it_has_not_arrived():
+    """It knows no current but from fixes, and has its first one there: a dive of 800 m."""
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 1000.0}
+    changes = {'dives': 0, 'duration_s': 20000.0, 'current.direction_deg': 90.0, 'path': path}
+    changes |= {'navigation.method': 'dead_reckoned', 'profile.depth_m': 800.0}
+    far = glider.fly('current_8deg', changes).score
+    missed_m = far['arrival']['missed_m']
+    assert (far['status'], far['arrival']['arrived']) == ('unfinished', False)
+    assert far['reason'] == f'came up {missed_m:,.0f} m from the last point of its path'
+    assert far['end_of_path_m'] == missed_m > 1000.0
+    assert dict(card_rows(far))['arrival'].endswith('too far off to have arrived')
+    path |= {'arrival_radius_m': math.ceil(missed_m)}
+    assert glider.fly('current_8deg', changes).score['status'] == 'completed'
+
+
 def test_a_path_in_three_dimensions_ends_at_the_surface_too():
     """The path ends 20 m deep: it comes up from there, along its last course."""
     path = {'kind': 'waypoints', 'waypoints': [[0, 0, 10], [400, 0, 200], [900, 200, 20]]}

@@ -84,7 +84,7 @@ def reaction(
         return None
     waypoints = [(float(odom[1]), float(odom[0]), rest[0][2]), *rest]
     try:
-        path = WaypointPath(kind='waypoints', waypoints=waypoints, at_end=settings.path.at_end)
+        path = WaypointPath(kind='waypoints', waypoints=waypoints, **settings.path.ending())
     except pydantic.ValidationError:  # it is there
         return None
     return Order(at_s=at_s, path=path)

@@ -24,6 +24,8 @@ class Rules(NamedTuple):
     navigation: str = 'known'  #: method by which the vehicle navigates
     path: PathParams | None = None  #: that was to be flown
     ends: bool = False  #: at the end of the path
+    arrival_radius_m: float = math.inf  #: of its last point, within which it is to come up
+    pace_s: float = math.inf  #: time that is ample for a metre of it and its stays (s/m)
     duration_s: float = math.inf  #: time that the mission has (s)
     origin: Origin | None = None  #: of its chart, if people read its places in degrees
     shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)

@@ -31,6 +31,7 @@ from glider_base.wiring import SENSORS
 from glider_control.law import LawSettings
 from glider_control.settings import LAWS, ControlLawSettings, ControlSettings, check_law, with_law
 from glider_guard.settings import GuardLimitSettings, GuardSettings
+from glider_guidance.guidance import path_time_s
 from glider_guidance.order import Order
 from glider_guidance.orders import check_orders
 from glider_guidance.path.settings import MAX_DEPTH_M, PathSettings, StraightPath
@@ -71,7 +72,7 @@ from glider_navigation.settings import NavigationLawSettings, NavigationSettings
 SCENARIO_FOLDER = Path(__file__).parent / 'scenarios'
 DEFAULT_SCENARIO = 'current_8deg'
 
-#: There is ample time for a dive in so many times what its glides take (-).
+#: There is ample time for a dive, or a path, in so many times what its glides take (-).
 AMPLE = 1.25
 #: A straight way is looked at at so many places, whether it leads over land.
 ALONG = 2000
@@ -380,23 +381,38 @@ class Scenario(Settings):
 
     def score_rules(self, sim_time_s: float) -> Rules:
         """By what a run that lasted ``sim_time_s`` is scored."""
+        dive_s = self._dive_s()
         return Rules(
-            self.settle_time_s(sim_time_s),
-            self.profile.depth_m,
-            self._glide_s(),
-            self.navigation.method,
-            self.path.params(),
-            self.path.at_end == 'stop',
-            self.duration_s,
-            self.origin.params() if self.is_charted else None,
-            self.shallowest_m,
-            min(self.dives, int(self.duration_s / (dive_s := self._dive_s()))),
-            dive_s,
+            settle_s=self.settle_time_s(sim_time_s),
+            depth_m=self.profile.depth_m,
+            glide_s=self._glide_s(),
+            navigation=self.navigation.method,
+            path=self.path.params(),
+            ends=self.path.at_end == 'stop',
+            arrival_radius_m=self.path.arrival_radius_m,
+            pace_s=self._pace_s(),
+            duration_s=self.duration_s,
+            origin=self.origin.params() if self.is_charted else None,
+            shallowest_m=self.shallowest_m,
+            dives=min(self.dives, int(self.duration_s / dive_s)),
+            dive_s=dive_s,
         )
 
     def _dive_s(self) -> float:
         """Time (s) that is ample for a stay and a dive; infinite where it may wait for good."""
         return math.inf if self._holds else AMPLE * 2.0 * self._glide_s() + self._stay_s()
+
+    def _pace_s(self) -> float:
+        """Time (s) that is ample for a metre of its path and its stays, in still water.
+
+        Infinite where it may wait for good.
+        """
+        if self._holds:
+            return math.inf
+        params, every = self.guidance_settings().params(), self.profile.surface_every_dives
+        glides_s = path_time_s(params, 0.0, 0.0)
+        stays = glides_s / (2.0 * every * self._glide_s()) if every else 0.0
+        return AMPLE * (glides_s + stays * self._stay_s()) / params.path.ways[-1]
 
     def _stay_s(self) -> float:
         """Time (s) of the longest stay at the surface."""

@@ -94,10 +94,10 @@ def arrival_of(
     behind_m: float,
     tick: int,
     since: int,
-    has_arrived: bool,
+    is_at_end: bool,
     rules: Rules,
 ) -> dict[str, Any] | None:
-    """Whether and when a vehicle came to the end of its path; None where that is not its end.
+    """Whether and when a vehicle came to the end of its path; None where it is to go on past it.
 
     Parameters
     ----------
@@ -111,30 +111,32 @@ def arrival_of(
         Of the arrival, else ticks of the run.
     since : int
         Tick from which the path is followed.
+    is_at_end : bool
+        Whether it came up there, or abeam of it, as it estimates.
 
     Returns
     -------
     dict
-        arrived, t_s, missed_m (distance from the last point), left_m (horizontal way along the
-        path), eta_s (when it arrives, or would at its pace so far), overrun_s (by what that is
-        beyond the time of the mission), place_latlon_deg (if there is a chart). What nobody knows
-        is None.
+        arrived (within `Rules.arrival_radius_m`), t_s (at the end), missed_m (distance from the
+        last point), left_m (horizontal way along the path), eta_s (when it is at the end, or
+        would be at its pace so far), overrun_s (by what that is beyond the time of the mission),
+        place_latlon_deg (if there is a chart). What nobody knows is None.
     """
     if rules.path is None or not rules.ends:
         return None
     t_s, length = seconds(tick), float(path_length(rules.path))
     end = path_point(length, rules.path)
-    left_m, eta_s = 0.0, t_s
-    if not has_arrived:
+    missed_m, left_m, eta_s = math.dist(place, end[:2]), 0.0, t_s
+    if not is_at_end:
         began_m, come_m = _come_from_to(targets, rules.path)
         ways, made_m = rules.path.ways, come_m - behind_m - began_m
         left_m = float(max(0.0, ways[-1] - np.interp(come_m, rules.path.knots, ways) + behind_m))
         pace_s = (t_s - seconds(since)) / made_m if made_m >= LEAST_SHARE * length else None
         eta_s = None if pace_s is None else t_s + (length - come_m + behind_m) * pace_s
     return {
-        'arrived': has_arrived,
-        't_s': t_s if has_arrived else None,
-        'missed_m': math.dist(place, end[:2]),
+        'arrived': is_at_end and missed_m <= rules.arrival_radius_m,
+        't_s': t_s if is_at_end else None,
+        'missed_m': missed_m,
         'left_m': left_m,
         'eta_s': eta_s,
         'overrun_s': None if eta_s is None else max(0.0, eta_s - rules.duration_s),

@@ -230,9 +230,9 @@ class Scorer:
         way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
+        rules = self._with_last_path(rules)
         arrival = self._arrival(rules)
-        ended = self._end is not None
-        missing = _missing(depth, dives, time_s, ended, arrival['arrival'], rules)
+        missing = self._missing(depth, dives, arrival['arrival'], rules)
         status, reason = outcome_of(depth, reported, self._hull, infeasible, missing)
         pace_m = way_m if status in (COMPLETED, INFEASIBLE) else None
         return {
@@ -289,12 +289,20 @@ class Scorer:
             travel[f'{self._steers_by}_deg'] = math.degrees(_travel(self._series('fin')))
         return travel
 
+    def _with_last_path(self, rules: Rules) -> Rules:
+        """Rules of the path that was ordered last."""
+        for path in (order.path for order in self._followed if order.path):
+            rules = rules._replace(
+                path=path.params(),
+                ends=path.at_end == 'stop',
+                arrival_radius_m=path.arrival_radius_m,
+            )
+        return rules
+
     def _arrival(self, rules: Rules) -> dict:
         """How far from the path's end it came up there, None if it did not; see `arrival_of`."""
         if self._last is None:
             return {'end_of_path_m': None, 'arrival': None}
-        for path in (order.path for order in self._followed if order.path):
-            rules = rules._replace(path=path.params(), ends=path.at_end == 'stop')
         tick, row = self._end or (self.ticks, self._last)
         odometry, targets = _odometry_of(row), self._targets()[self._path_since :]
         courses = [self._course_rad, *(led for *_, led in self._reroutes if led is not None)]
@@ -304,11 +312,34 @@ class Scorer:
             behind_m=_along_m(row, targets[::-1], courses[-1] + math.pi),
             tick=tick,
             since=self._path_since,
-            has_arrived=self._end is not None,
+            is_at_end=self._end is not None,
             rules=rules,
         )
-        end_m = arrival['missed_m'] if arrival and arrival['arrived'] else None
+        end_m = arrival['missed_m'] if arrival and self._end else None
         return {'end_of_path_m': end_m, 'arrival': arrival}
+
+    def _missing(self, depth: np.ndarray, dives: int, arrival: dict | None, rules: Rules) -> str:
+        """What of its mission was not flown, in words; empty if nothing."""
+        time_s, ended = seconds(self.ticks), self._end is not None
+        if ended and arrival and not arrival['arrived']:
+            return f'came up {arrival["missed_m"]:,.0f} m from the last point of its path'
+        if time_s < rules.duration_s:
+            # who has arrived, or is to go on, may be done before
+            drifts = arrival and not ended and not 0 < rules.dives <= dives
+            if rules.dives_at_all and drifts:
+                return 'afloat for longer than it was to wait, before the end of its path'
+            return ''
+        if dives < rules.dives:
+            return f'dives flown, of those that there was time for: {dives} of {rules.dives}'
+        if rules.dives_at_all and not dives and not _dives_at_all(depth):
+            return 'no dive flown, for which there was time'
+        if rules.dives_at_all and not ended and _idles(depth, rules):
+            return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
+        ample_s = rules.dive_s + rules.pace_s * rules.path.ways[-1] if arrival else math.inf
+        if not ended and not rules.dives and time_s - seconds(self._path_since) >= ample_s:
+            off = f'{arrival["missed_m"]:,.0f} m from its last point'
+            return f'not at the end of its path, for which there was time: {off}'
+        return ''
 
     def _final_state(self) -> dict | None:
         """Position, attitude and velocity over ground (body axes FRD) of the last tick."""
@@ -395,25 +426,6 @@ def _count_dives(depth, dive):
         dives = dives_after(dives, now, dive)
     is_up = dives.is_down or dives.turn < dive
     return dives.count if is_up else max(0, dives.count - 1)
-
-
-def _missing(
-    depth: np.ndarray, dives: int, time_s: float, ended: bool, arrival: dict | None, rules: Rules
-) -> str:
-    """What of its mission was not flown, in words; empty if nothing."""
-    if time_s < rules.duration_s:
-        # who has arrived, or is to go on, may be done before
-        drifts = arrival and not arrival['arrived'] and not 0 < rules.dives <= dives
-        if rules.dives_at_all and drifts:
-            return 'afloat for longer than it was to wait, before the end of its path'
-        return ''
-    if dives < rules.dives:
-        return f'dives flown, of those that there was time for: {dives} of {rules.dives}'
-    if rules.dives_at_all and not dives and not _dives_at_all(depth):
-        return 'no dive flown, for which there was time'
-    if rules.dives_at_all and not ended and _idles(depth, rules):
-        return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
-    return ''
 
 
 def _dives_at_all(depth: np.ndarray) -> bool:

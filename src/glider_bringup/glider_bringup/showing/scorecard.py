@@ -119,9 +119,10 @@ def arrival_text(card: dict) -> str:
         return ''
     place = part['place_latlon_deg']
     where = f', at {place_text(*place)}' if place else ''
-    if part['arrived']:
+    if part['t_s'] is not None:
         missed = show(part['missed_m'], 'm', 1)
-        return f'came up {missed} from its last point after {span(part["t_s"])}{where}'
+        text = f'came up {missed} from its last point after {span(part["t_s"])}{where}'
+        return text + ('' if part['arrived'] else ', too far off to have arrived')
     text = f'did not arrive in {span(card["sim_time_s"])}: {way(part["left_m"])} left{where}'
     more_s = None if part['eta_s'] is None else part['eta_s'] - card['sim_time_s']
     return text + ('' if more_s is None else f'; at its pace {span(more_s)} more')

@@ -4,7 +4,7 @@
 
 import math
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 import pydantic
@@ -22,6 +22,8 @@ MAX_SLOPE_DEG = 80.0
 MIN_LEG_M = 1.0
 #: A path through waypoints is at least so long (m): it is shorter than any turn of a glider.
 MIN_WAY_M = 10.0
+#: Who comes up within this of the last point (m) has arrived, as with targets of Seagliders.
+ARRIVAL_RADIUS_M = 1000.0
 #: Least norm(dp_d/ds) of a spline (m/m). Where it vanishes the tangent is undefined.
 MIN_RATE = 0.1
 
@@ -84,6 +86,15 @@ class _PathSettings(Settings):
         'stop',
         description='At the end: stop, come up and end the mission; or continue straight on.',
     )
+    arrival_radius_m: float = number(
+        ARRIVAL_RADIUS_M,
+        (MIN_LEG_M, MAX_DISTANCE_M),
+        'It has arrived if it comes up this close to the last point, by its true place (m).',
+    )
+
+    def ending(self) -> dict[str, Any]:
+        """Fields that say how it ends, for a path that takes its place."""
+        return {'at_end': self.at_end, 'arrival_radius_m': self.arrival_radius_m}
 
     def params(self) -> PathParams:
         """Numbers that the kernels of `glider_guidance.path.curve` read."""

@@ -144,7 +144,7 @@ class Pilot:
         path = WaypointPath(
             kind='waypoints',
             waypoints=[tuple(map(float, corner)) for corner in corners],
-            at_end=self._scenario.path.at_end,
+            **self._scenario.path.ending(),
         )
         order = Order(at_s=t_s, path=path)
         self.orders.append(order)
