@@ -154,7 +154,7 @@ def test_who_cannot_steer_has_not_completed_its_survey():
     missed = f'{score["arrival"]["missed_m"]:,.0f} m from its last point'
     assert score['arrival']['missed_m'] > 1000.0
     assert score['status'] == 'unfinished'
-    assert f'not at the end of its path, for which there was time: {missed}' in score['reason']
+    assert f'not at the end of its path in ample time: {missed}' in score['reason']
     short = glider.fly('survey', {'faults': [stuck], 'duration_s': 12000.0}).score
     assert (short['status'], short['arrival']['arrived']) == ('completed', False)
 
@@ -172,6 +172,21 @@ def test_who_comes_up_abeam_of_its_last_point_but_far_from_it_has_not_arrived():
     assert dict(card_rows(far))['arrival'].endswith('too far off to have arrived')
     path |= {'arrival_radius_m': math.ceil(missed_m)}
     assert glider.fly('current_8deg', changes).score['status'] == 'completed'
+
+
+@pytest.mark.parametrize('name', ['spline', 'helix'])
+def test_who_comes_up_from_the_end_of_a_path_in_depth_has_arrived(name):
+    """It ends hundreds of metres deep, and a climb leads it on by more than a kilometre."""
+    score = glider.fly(name, {'duration_s': 9000.0}).score
+    assert score['arrival']['missed_m'] > 1000.0
+    assert (score['status'], score['arrival']['arrived']) == ('completed', True)
+
+
+def test_who_cannot_steer_has_not_followed_its_path_in_depth():
+    stuck = {'kind': 'stuck', 'actuator': 'roll_mass', 'at_s': 100.0}
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0, 10], [400, 0, 200], [900, 200, 20]]}
+    score = glider.fly('spline', {'duration_s': 6000.0, 'path': path, 'faults': [stuck]}).score
+    assert (score['status'], score['arrival']['arrived']) == ('unfinished', False)
 
 
 def test_a_path_in_three_dimensions_ends_at_the_surface_too():

@@ -287,7 +287,7 @@ def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
     assert arrival['arrived']
     assert arrival['t_s'] == pytest.approx(50.1, abs=1e-6)
     assert (arrival['left_m'], arrival['overrun_s'], arrival['place_latlon_deg']) == (0, 0, None)
-    told = score(log, path=path, ends=True, arrival_radius_m=4.9)
+    told = score(log, path=path, ends=True, arrival_radius_m=4.9, glide_s=100.0)
     assert told['arrival'] == {**arrival, 'arrived': False}
     assert told['end_of_path_m'] == pytest.approx(5.0, abs=1e-9)
     assert told['status'] == 'unfinished'

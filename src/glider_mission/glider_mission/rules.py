@@ -20,7 +20,7 @@ class Rules(NamedTuple):
 
     settle_s: float = 0.0  #: settling time (s)
     depth_m: float = 1000.0  #: depth of the lower turn (m)
-    glide_s: float = math.inf  #: time of one dive or climb (s)
+    glide_s: float = math.inf  #: time of one dive or climb (s); along a path in depth infinite
     navigation: str = 'known'  #: method by which the vehicle navigates
     path: PathParams | None = None  #: that was to be flown
     ends: bool = False  #: at the end of the path
@@ -36,6 +36,19 @@ class Rules(NamedTuple):
     def dives_at_all(self) -> bool:
         """Whether there is time for a dive, and it is to fly some."""
         return self.dive_s < self.duration_s
+
+    @property
+    def ample_s(self) -> float:
+        """Time that is ample for its path, and for the dive during which it may be given (s)."""
+        path_s = self.pace_s * float(self.path.ways[-1]) if self.path else math.inf
+        return path_s + (self.dive_s if math.isfinite(self.glide_s) else 0.0)
+
+    def has_arrived(self, missed_m: float) -> bool:
+        """Whether who came up so far from the end of its path has arrived.
+
+        From the end of a path in depth it comes up wherever that leads.
+        """
+        return missed_m <= self.arrival_radius_m or math.isinf(self.glide_s)
 
     @property
     def margin_s(self) -> float:

@@ -117,7 +117,7 @@ def arrival_of(
     Returns
     -------
     dict
-        arrived (within `Rules.arrival_radius_m`), t_s (at the end), missed_m (distance from the
+        arrived (see `Rules.has_arrived`), t_s (at the end), missed_m (distance from the
         last point), left_m (horizontal way along the path), eta_s (when it is at the end, or
         would be at its pace so far), overrun_s (by what that is beyond the time of the mission),
         place_latlon_deg (if there is a chart). What nobody knows is None.
@@ -134,7 +134,7 @@ def arrival_of(
         pace_s = (t_s - seconds(since)) / made_m if made_m >= LEAST_SHARE * length else None
         eta_s = None if pace_s is None else t_s + (length - come_m + behind_m) * pace_s
     return {
-        'arrived': is_at_end and missed_m <= rules.arrival_radius_m,
+        'arrived': is_at_end and rules.has_arrived(missed_m),
         't_s': t_s if is_at_end else None,
         'missed_m': missed_m,
         'left_m': left_m,

@@ -335,10 +335,10 @@ class Scorer:
             return 'no dive flown, for which there was time'
         if rules.dives_at_all and not ended and _idles(depth, rules):
             return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
-        ample_s = rules.dive_s + rules.pace_s * rules.path.ways[-1] if arrival else math.inf
-        if not ended and not rules.dives and time_s - seconds(self._path_since) >= ample_s:
+        had_s = time_s - seconds(self._path_since)
+        if arrival and not ended and not rules.dives and had_s >= rules.ample_s:
             off = f'{arrival["missed_m"]:,.0f} m from its last point'
-            return f'not at the end of its path, for which there was time: {off}'
+            return f'not at the end of its path in ample time: {off}'
         return ''
 
     def _final_state(self) -> dict | None:
