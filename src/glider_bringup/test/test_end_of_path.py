@@ -154,9 +154,78 @@ def test_who_cannot_steer_has_not_completed_its_survey():
     missed = f'{score["arrival"]["missed_m"]:,.0f} m from its last point'
     assert score['arrival']['missed_m'] > 1000.0
     assert score['status'] == 'unfinished'
-    assert f'not at the end of its path in ample time: {missed}' in score['reason']
+    assert f', for which there was time in still water: {missed}' in score['reason']
     short = glider.fly('survey', {'faults': [stuck], 'duration_s': 12000.0}).score
     assert (short['status'], short['arrival']['arrived']) == ('completed', False)
+
+
+NORTH = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 1000.0}
+STUCK = {'kind': 'stuck', 'actuator': 'roll_mass', 'at_s': 300.0}
+HELIX = {'kind': 'helix', 'radius_m': 2000.0, 'centre': [0, 0, 20], 'slope_deg': 5.0, 'turns': 0.5}
+FAR = {'kind': 'straight', 'start': [12000.0, 0.0], 'course_deg': 0.0, 'length_m': 500.0}
+SURVEY = load_scenario('survey').path.model_dump(mode='json')
+
+
+@pytest.mark.parametrize(
+    ('name', 'changes', 'missing'),
+    [
+        # it takes 10 km to a path of 1 km, and to one that is ordered
+        ('survey', {'initial.north_m': -8000.0, 'path': NORTH, 'duration_s': 17000.0}, ''),
+        ('survey', {'duration_s': 20000.0, 'orders': [{'at_s': 3000.0, 'path': FAR}]}, ''),
+        # dives of 60 m, of which there was time for seven, become dives of 600 m
+        (
+            'current_8deg',
+            {
+                'profile.depth_m': 60.0,
+                'dives': 10,
+                'duration_s': 9000.0,
+                'orders': [{'at_s': 600.0, 'depth_m': 600.0}],
+            },
+            '',
+        ),
+        # its time is over between two ticks
+        ('survey', {'faults': [STUCK], 'duration_s': 21600.04}, 'not at the end of its path'),
+        # a pilot who sends it to the same point again and again has no other mission
+        (
+            'survey',
+            {
+                'faults': [STUCK],
+                'duration_s': 26000.0,
+                'orders': [{'at_s': at_s, 'path': SURVEY} for at_s in (5000.0, 15000.0, 24000.0)],
+            },
+            'not at the end of its path',
+        ),
+        # who was held for some minutes had ample time all the same
+        (
+            'survey',
+            {
+                'faults': [STUCK],
+                'duration_s': 26000.0,
+                'orders': [{'at_s': 2000.0, 'hold': True}, {'at_s': 3000.0, 'resume': True}],
+            },
+            'not at the end of its path',
+        ),
+        (
+            'helix',
+            {
+                'faults': [STUCK],
+                'path': HELIX,
+                'initial.east_m': -2000.0,
+                'duration_s': 30000.0,
+                'guard.stalled_s': 30000.0,
+            },
+            'not at the end of its path',
+        ),
+    ],
+)
+def test_what_there_was_time_for_goes_by_the_way_and_the_orders(name, changes, missing):
+    score = glider.fly(name, changes).score
+    assert score['reason'].startswith(missing) and bool(score['reason']) == bool(missing)
+    assert score['status'] == ('unfinished' if missing else 'completed')
+    if arrival := score['arrival']:
+        assert not arrival['arrived']
+        assert arrival['left_m'] > 0.0
+        assert arrival['eta_s'] is None or arrival['eta_s'] > score['sim_time_s']
 
 
 def test_who_comes_up_abeam_of_its_last_point_but_far_from_it_has_not_arrived():

@@ -25,7 +25,8 @@ class Rules(NamedTuple):
     path: PathParams | None = None  #: that was to be flown
     ends: bool = False  #: at the end of the path
     arrival_radius_m: float = math.inf  #: of its last point, within which it is to come up
-    pace_s: float = math.inf  #: time that is ample for a metre of it and its stays (s/m)
+    pace_s: float = math.inf  #: time that is ample for a metre of way and its stays (s/m)
+    spare_s: float = math.inf  #: beside that; infinite where it may wait for good (s)
     duration_s: float = math.inf  #: time that the mission has (s)
     origin: Origin | None = None  #: of its chart, if people read its places in degrees
     shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)
@@ -36,12 +37,6 @@ class Rules(NamedTuple):
     def dives_at_all(self) -> bool:
         """Whether there is time for a dive, and it is to fly some."""
         return self.dive_s < self.duration_s
-
-    @property
-    def ample_s(self) -> float:
-        """Time that is ample for its path, and for the dive during which it may be given (s)."""
-        path_s = self.pace_s * float(self.path.ways[-1]) if self.path else math.inf
-        return path_s + (self.dive_s if math.isfinite(self.glide_s) else 0.0)
 
     def has_arrived(self, missed_m: float) -> bool:
         """Whether who came up so far from the end of its path has arrived.

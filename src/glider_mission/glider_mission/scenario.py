@@ -391,6 +391,7 @@ class Scenario(Settings):
             ends=self.path.at_end == 'stop',
             arrival_radius_m=self.path.arrival_radius_m,
             pace_s=self._pace_s(),
+            spare_s=self._held_s() if self.profile.mode == 'path' else dive_s,
             duration_s=self.duration_s,
             origin=self.origin.params() if self.is_charted else None,
             shallowest_m=self.shallowest_m,
@@ -400,30 +401,56 @@ class Scenario(Settings):
 
     def _dive_s(self) -> float:
         """Time (s) that is ample for a stay and a dive; infinite where it may wait for good."""
-        return math.inf if self._holds else AMPLE * 2.0 * self._glide_s() + self._stay_s()
+        if self._held_s() and (self.dives or math.isinf(self._held_s())):
+            return math.inf
+        slowest_s = max(self._glide_s(settings) for settings in self._in_turn())
+        return AMPLE * 2.0 * slowest_s + self._stay_s() + self._held_s()
 
     def _pace_s(self) -> float:
-        """Time (s) that is ample for a metre of its path and its stays, in still water.
+        """Time (s) that is ample for a metre of its path and its stays, in still water."""
+        return max(self._pace_of(settings) for settings in self._in_turn())
 
-        Infinite where it may wait for good.
-        """
-        if self._holds:
-            return math.inf
-        params, every = self.guidance_settings().params(), self.profile.surface_every_dives
-        glides_s = path_time_s(params, 0.0, 0.0)
-        stays = glides_s / (2.0 * every * self._glide_s()) if every else 0.0
-        return AMPLE * (glides_s + stays * self._stay_s()) / params.path.ways[-1]
+    def _pace_of(self, settings: GuidanceSettings) -> float:
+        """The same with what guidance is told at one time."""
+        params, every = settings.params(), self.profile.surface_every_dives
+        time_s = path_time_s(params, 0.0, 0.0)
+        if params.profile.follows_path:  # it takes its time for the way down and up, too
+            depths = self.path.points(ALONG)[:, 2]
+            time_s += float(np.sum(np.abs(np.diff(depths)))) / params.profile.glide_rate
+        elif every:
+            time_s += time_s / (2.0 * every * self._glide_s(settings)) * self._stay_s()
+        return AMPLE * time_s / params.path.ways[-1]
+
+    def _in_turn(self) -> list[GuidanceSettings]:
+        """What guidance is told of its glides, by its mission and then by each order."""
+        told = [self.guidance_settings()]
+        for order in sorted(self.orders, key=lambda one: one.tick):
+            changes = {'depth_m': order.depth_m, 'pitch_deg': order.pitch_deg}
+            if kept := {name: value for name, value in changes.items() if value is not None}:
+                profile = told[-1].profile.model_copy(update=kept)
+                told.append(told[-1].model_copy(update={'profile': profile}))
+        return told
+
+    def _held_s(self) -> float:
+        """Time (s) from each order to hold to that to resume; infinite if there is none."""
+        held_s, since_s = 0.0, math.inf
+        for order in sorted(self.orders, key=lambda one: one.tick):
+            if order.hold:
+                since_s = order.at_s
+            elif order.resume:
+                held_s, since_s = held_s + order.at_s - since_s, math.inf
+        return held_s if math.isinf(since_s) else math.inf
 
     def _stay_s(self) -> float:
         """Time (s) of the longest stay at the surface."""
         waits_s = (one.wait_s or 0.0 for one in self.orders)
         return max([self.profile.wait_s, *waits_s]) + self.profile.prepare_s
 
-    def _glide_s(self) -> float:
+    def _glide_s(self, settings: GuidanceSettings | None = None) -> float:
         """Time of a glide to the depth of the lower turn (s); infinite along a path in 3-D."""
         if self.profile.mode == 'path':
             return math.inf
-        profile = self.guidance_settings().params().profile
+        profile = (settings or self.guidance_settings()).params().profile
         return profile.depth / profile.glide_rate
 
     def with_orders(self, orders: Iterable[Order]) -> 'Scenario':

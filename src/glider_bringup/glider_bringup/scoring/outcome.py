@@ -18,7 +18,13 @@ from glider_guard.block import TELL_EVERY_NS
 from glider_guard.rows import DROPS, ROWS, SURFACES
 from glider_guard.settings import GuardLimitSettings
 from glider_guard.witness import AFLOAT_M
-from glider_guidance.path.curve import PathParams, path_closest, path_length, path_point
+from glider_guidance.path.curve import (
+    PathParams,
+    path_closest,
+    path_length,
+    path_point,
+    path_tangent,
+)
 from glider_mission.rules import Rules
 from glider_model.ocean.bottom import least_height
 
@@ -91,7 +97,6 @@ def _beyond(depth: np.ndarray, limit_m: float, what: str) -> str:
 def arrival_of(
     place: tuple[float, float],
     targets: np.ndarray,
-    behind_m: float,
     tick: int,
     since: int,
     is_at_end: bool,
@@ -105,8 +110,6 @@ def arrival_of(
         True one at the arrival, else at the end of the run, north and east (m).
     targets : float64[ticks, 2]
         The points of the path that guidance had come to, north and east (m), since it follows it.
-    behind_m : float
-        How far it is behind the last of them, along the path: it may have been carried back.
     tick : int
         Of the arrival, else ticks of the run.
     since : int
@@ -129,6 +132,10 @@ def arrival_of(
     missed_m, left_m, eta_s = math.dist(place, end[:2]), 0.0, t_s
     if not is_at_end:
         began_m, come_m = _come_from_to(targets, rules.path)
+        # along the path as it goes on: it may have been carried back, or be past a corner
+        d_n, d_e, _ = path_tangent(come_m + SAME_M, rules.path)
+        back_n, back_e = targets[-1] - place
+        behind_m = float(d_n * back_n + d_e * back_e) / math.hypot(d_n, d_e)
         ways, made_m = rules.path.ways, come_m - behind_m - began_m
         left_m = float(max(0.0, ways[-1] - np.interp(come_m, rules.path.knots, ways) + behind_m))
         pace_s = (t_s - seconds(since)) / made_m if made_m >= LEAST_SHARE * length else None
@@ -142,6 +149,13 @@ def arrival_of(
         'overrun_s': None if eta_s is None else max(0.0, eta_s - rules.duration_s),
         'place_latlon_deg': list(to_geodetic(*place, rules.origin)) if rules.origin else None,
     }
+
+
+def way_to_end(place: tuple[float, float], path: PathParams) -> float:
+    """Horizontal way (m) from a place to the nearest point of a path, and along it to its end."""
+    s = path_closest(*place, 0.0, True, path)
+    entry = path_point(s, path)
+    return math.dist(place, entry[:2]) + path.ways[-1] - float(np.interp(s, path.knots, path.ways))
 
 
 def _come_from_to(targets: np.ndarray, path: PathParams) -> tuple[float, float]:

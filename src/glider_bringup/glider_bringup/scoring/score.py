@@ -32,11 +32,13 @@ from glider_bringup.scoring.navigation import NavigationScorer
 from glider_bringup.scoring.outcome import (
     COMPLETED,
     INFEASIBLE,
+    SAME_M,
     BottomWatch,
     arrival_of,
     as_reported,
     ends_mission,
     outcome_of,
+    way_to_end,
 )
 from glider_bringup.scoring.scores import Flown, measured, seconds
 from glider_bringup.scoring.true_motion import TrueMotion, course_at, jumps
@@ -45,6 +47,7 @@ from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE
 from glider_guidance.block import say_no_progress
 from glider_guidance.order import Order
 from glider_guidance.orders import begins, first_ticks
+from glider_guidance.path.curve import PathParams, path_length, path_point
 from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
@@ -119,7 +122,8 @@ class Scorer:
         vehicle, bottom = load_vehicle(scenario.vehicle), scenario.bottom()
         self._waiting = list(scenario.orders)
         self._followed: list[Order] = []  #: orders that held
-        self._path_since = 0  #: tick from which the last path is followed
+        #: first tick of each other path that was ordered, the place there, and the path
+        self._ordered: list[tuple[int, tuple[float, float], PathParams]] = []
         reckons = scenario.navigation.jumps
         #: that it needs, beside those that are always read
         self.topics = ('fix', 'believed_current', 'current_velocity') if reckons else ()
@@ -183,7 +187,9 @@ class Scorer:
             self._waiting = [one for one in self._waiting if one is not order and not order.abort]
             self._followed.append(order)
             if order.path:
-                self._end, path_from, self._path_since = None, row, begin + row
+                self._end, path_from = None, row
+                place = _place_of(log[row])
+                self._ordered.append((begin + row, place, order.path.params()))
         at_end = path_from + np.flatnonzero(stage[path_from:] == AT_END_OF_PATH)
         if self._end is None and len(at_end):
             self._end = begin + int(at_end[0]), log[at_end[0]].copy()
@@ -230,9 +236,9 @@ class Scorer:
         way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
         infeasible = bool(len(held) and np.mean(~held) >= INFEASIBLE_SHARE)
-        rules = self._with_last_path(rules)
+        task, rules = self._task(rules.path), self._with_last_path(rules)
         arrival = self._arrival(rules)
-        missing = self._missing(depth, dives, arrival['arrival'], rules)
+        missing = self._missing(depth, dives, arrival['arrival'], task, rules)
         status, reason = outcome_of(depth, reported, self._hull, infeasible, missing)
         pace_m = way_m if status in (COMPLETED, INFEASIBLE) else None
         return {
@@ -304,26 +310,46 @@ class Scorer:
         if self._last is None:
             return {'end_of_path_m': None, 'arrival': None}
         tick, row = self._end or (self.ticks, self._last)
-        odometry, targets = _odometry_of(row), self._targets()[self._path_since :]
-        courses = [self._course_rad, *(led for *_, led in self._reroutes if led is not None)]
+        since = self._ordered[-1][0] if self._ordered else 0
         arrival = arrival_of(
-            place=(odometry.p_n, odometry.p_e),
-            targets=targets,
-            behind_m=_along_m(row, targets[::-1], courses[-1] + math.pi),
+            place=_place_of(row),
+            targets=self._targets()[since:],
             tick=tick,
-            since=self._path_since,
+            since=since,
             is_at_end=self._end is not None,
             rules=rules,
         )
         end_m = arrival['missed_m'] if arrival and self._end else None
         return {'end_of_path_m': end_m, 'arrival': arrival}
 
-    def _missing(self, depth: np.ndarray, dives: int, arrival: dict | None, rules: Rules) -> str:
+    def _task(self, path: PathParams | None) -> tuple[int, float]:
+        """Tick from which it is to come to its last point, and the way there from then on (m).
+
+        ``path`` is that of its mission. Another one to the same point is the same task, which may
+        be longer: a planned route is ordered anew at every surfacing.
+        """
+        tick, way_m, goal = 0, math.inf, None
+        begins = [(0, _place_of(self._first), path)] if path and self.ticks else []
+        for since, place, path in (*begins, *self._ordered):
+            before, goal = goal, path_point(path_length(path), path)[:2]
+            is_same = before is not None and math.dist(before, goal) <= SAME_M
+            to_end_m = way_to_end(place, path)
+            tick, way_m = (tick, max(way_m, to_end_m)) if is_same else (since, to_end_m)
+        return tick, way_m
+
+    def _missing(
+        self,
+        depth: np.ndarray,
+        dives: int,
+        arrival: dict | None,
+        task: tuple[int, float],
+        rules: Rules,
+    ) -> str:
         """What of its mission was not flown, in words; empty if nothing."""
         time_s, ended = seconds(self.ticks), self._end is not None
         if ended and arrival and not arrival['arrived']:
             return f'came up {arrival["missed_m"]:,.0f} m from the last point of its path'
-        if time_s < rules.duration_s:
+        if rules.duration_s - time_s > TICK_S:
             # who has arrived, or is to go on, may be done before
             drifts = arrival and not ended and not 0 < rules.dives <= dives
             if rules.dives_at_all and drifts:
@@ -335,10 +361,11 @@ class Scorer:
             return 'no dive flown, for which there was time'
         if rules.dives_at_all and not ended and _idles(depth, rules):
             return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
-        had_s = time_s - seconds(self._path_since)
-        if arrival and not ended and not rules.dives and had_s >= rules.ample_s:
+        since, way_m = task
+        ample_s = rules.spare_s + rules.pace_s * way_m
+        if arrival and not ended and not rules.dives and time_s - seconds(since) >= ample_s:
             off = f'{arrival["missed_m"]:,.0f} m from its last point'
-            return f'not at the end of its path in ample time: {off}'
+            return f'not at the end of its path, for which there was time in still water: {off}'
         return ''
 
     def _final_state(self) -> dict | None:
@@ -356,6 +383,12 @@ class Scorer:
 
 def _odometry_of(row: np.ndarray) -> Odometry:
     return odometry_from_wire(tuple(row[_ODOM].tolist()))
+
+
+def _place_of(row: np.ndarray) -> tuple[float, float]:
+    """North and east (m)."""
+    odometry = _odometry_of(row)
+    return odometry.p_n, odometry.p_e
 
 
 def scores_of(scenario: Scenario, scorer: Scorer) -> dict:
