@@ -168,6 +168,31 @@ def test_another_path_is_entered_at_its_nearest_point(when):
     assert flight.now['odom_east'] > east + 100.0
 
 
+@pytest.mark.parametrize(('at_s', 'when'), [(2000.0, 'surfacing'), (3200.0, 'once')])
+def test_who_is_at_the_end_of_its_path_flies_the_next_one(at_s, when):
+    """It is up at 3,000 s. The next path is a box of 1.6 km, whose end is as near as its start."""
+    first = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 800.0}
+    box = [[850, 0], [1250, 0], [1250, 400], [850, 400], [850, 0]]
+    order = {'at_s': at_s, 'when': when, 'path': {'kind': 'waypoints', 'waypoints': box}}
+    changes = {'path': first, 'orders': [order], 'profile.surface_every_dives': 1}
+    run = glider.fly('survey', {**changes, 'current.speed_kn': 0.0, 'duration_s': 15000.0})
+    data = run.to_xarray()
+    for north, east in box:
+        off = np.hypot(data.ground_truth_odom_north - north, data.ground_truth_odom_east - east)
+        assert off.min() < 100.0
+    assert (run.score['status'], run.score['arrival']['arrived']) == ('completed', True)
+
+
+@pytest.mark.parametrize('start', [(-3.0, 5.0), (3.0, -5.0)])
+def test_a_box_is_flown_round_wherever_beside_its_start_it_begins(start):
+    """On the one side its last leg is nearer than its first."""
+    box = [[0, 0], [400, 0], [400, 400], [0, 400], [0, 0]]
+    changes = {'path': {'kind': 'waypoints', 'waypoints': box}, 'current.speed_kn': 0.0}
+    changes |= {'initial.north_m': start[0], 'initial.east_m': start[1]}
+    score = glider.fly('survey', {**changes, 'duration_s': 10000.0}).score
+    assert score['arrival']['arrived'] and score['arrival']['t_s'] > 1200.0 / 0.4
+
+
 def test_who_aborts_comes_up_for_good():
     flight = ordered({'abort': True})
     assert depths(flight, 5000.0)[-1] < 1.0

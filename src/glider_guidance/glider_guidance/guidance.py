@@ -26,7 +26,7 @@ from glider_guidance.method import Leg, Situation, method_step
 from glider_guidance.path.curve import (
     PathParams,
     path_angles,
-    path_closest,
+    path_entry,
     path_errors,
     path_length,
     path_point,
@@ -237,8 +237,8 @@ def _change_path(state, s, params):
     if profile.stage == AT_END_OF_PATH:
         done = 0 < params.profile.dives <= profile.dives
         stage = WAITING_ON_SURFACE if done else SURFACE_PREPARATION
-        profile = replace(profile, stage=stage, ticks=0)
-    if is_descending(profile.stage):
+        profile = replace(profile, stage=stage, ticks=0, turn_depth=params.profile.depth)
+    elif is_descending(profile.stage):
         profile = replace(profile, turn_depth=params.profile.depth)
     progress = on_another_path(state.progress, state.tick, s, params.no_progress_surfacings)
     return replace(state, profile=profile, s=s, path_id=params.path_id, progress=progress)
@@ -466,7 +466,7 @@ def guidance_step(
     odometry = gate.odometry
     if state.tick == 0 or state.path_id != params.path_id:
         x, horizontal = odometry, not params.profile.follows_path
-        s = path_closest(x.p_n, x.p_e, x.p_d, horizontal, params.path)
+        s = path_entry(x.p_n, x.p_e, x.p_d, horizontal, params.path)
         if state.tick == 0:
             state = _start(state, odometry, s, params)
         else:

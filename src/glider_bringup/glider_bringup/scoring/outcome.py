@@ -21,6 +21,7 @@ from glider_guard.witness import AFLOAT_M
 from glider_guidance.path.curve import (
     PathParams,
     path_closest,
+    path_entry,
     path_length,
     path_point,
     path_tangent,
@@ -152,8 +153,8 @@ def arrival_of(
 
 
 def way_to_end(place: tuple[float, float], path: PathParams) -> float:
-    """Horizontal way (m) from a place to the nearest point of a path, and along it to its end."""
-    s = path_closest(*place, 0.0, True, path)
+    """Horizontal way (m) from a place to where a path is entered, and along it to its end."""
+    s = path_entry(*place, 0.0, True, path)
     entry = path_point(s, path)
     return math.dist(place, entry[:2]) + path.ways[-1] - float(np.interp(s, path.knots, path.ways))
 
@@ -163,7 +164,7 @@ def _come_from_to(targets: np.ndarray, path: PathParams) -> tuple[float, float]:
 
     Where the path comes by a point again, it is the time that fits the way between the two.
     """
-    began_m = float(path_closest(*targets[0], 0.0, True, path))
+    began_m = float(path_entry(*targets[0], 0.0, True, path))
     way_m = float(np.sum(np.hypot(*np.diff(targets, axis=0).T)))
     way_m += np.interp(began_m, path.knots, path.ways)
     likely_m = float(np.interp(way_m, path.ways, path.knots))

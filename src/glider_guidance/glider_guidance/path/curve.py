@@ -28,6 +28,8 @@ _BISECTIONS = 60
 _CLOSER_M = 1e-6
 #: Step along the path over which its turn is measured (m); a larger turn in it is a corner (rad).
 _TURN_STEP_M, _CORNER_RAD = 1.0, 0.2
+#: Who is so near to start and end of a path that comes back is at its start (m).
+_BACK_M = 1000.0
 
 
 class PathParams(NamedTuple):
@@ -205,3 +207,17 @@ def path_closest(p_n, p_e, p_d, horizontal, params):
         if distance < best - _CLOSER_M:
             best_s = low
     return min(best_s, params.knots[-1])
+
+
+@kernel
+def path_entry(p_n, p_e, p_d, horizontal, params):
+    """Parameter s (m) at which a path is entered: that of its `path_closest` point.
+
+    On a path that comes back to where it begins, who is there has all of it before him.
+    """
+    s, length = path_closest(p_n, p_e, p_d, horizontal, params), path_length(params)
+    n, e, _ = path_point(0.0, params)
+    end_n, end_e, _ = path_point(length, params)
+    comes_back = 2.0 * math.hypot(end_n - n, end_e - e) < length
+    is_there = length - s < _BACK_M and math.hypot(p_n - n, p_e - e) < _BACK_M
+    return 0.0 if horizontal and comes_back and is_there else s

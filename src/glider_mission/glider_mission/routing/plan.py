@@ -11,7 +11,7 @@ import numpy as np
 from glider_base.errors import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_guidance.guidance import GuidanceParams
-from glider_guidance.path.curve import path_closest, path_point
+from glider_guidance.path.curve import path_entry, path_point
 from glider_mission.routing.forecast_chart import erroneous, forecast_of, with_land
 from glider_mission.routing.fronts import Chart, fronts, sail
 from glider_mission.scenario import Scenario
@@ -289,7 +289,7 @@ def waypoints_of(scenario: Scenario) -> np.ndarray:
     """Where a mission starts, joins its path, and the corners after that (m), float64[n, 2]."""
     path, initial = scenario.path.params(), scenario.initial
     start = initial.north_m, initial.east_m, initial.depth_m
-    s = path_closest(*start, scenario.profile.mode != 'path', path)
+    s = path_entry(*start, scenario.profile.mode != 'path', path)
     ways = np.array([path_point(at, path)[:2] for at in (s, *path.knots[path.knots > s])])
     is_there = len(ways) > 1 and np.hypot(*(ways[0] - start[:2])) < _STRAIGHT_M
     return np.vstack((start[:2], ways[int(is_there) :]))
