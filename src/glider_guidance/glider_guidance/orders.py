@@ -79,15 +79,43 @@ def reaction(
         return Order(at_s=at_s, hold=True)
     if settings.no_progress != 'skip' or settings.path.kind != 'waypoints':
         return None
-    rest = settings.path.waypoints[no_progress + 1 :]
-    if not rest:
+    return _to(settings.path.waypoints[no_progress + 1 :], settings, odom, at_s)
+
+
+def _to(
+    points: Sequence[Sequence[float]],
+    settings: GuidanceSettings,
+    odom: Sequence[float],
+    at_s: float,
+) -> Order | None:
+    """Order of the path from where it is through some points; None if it is there."""
+    if not points:
         return None
-    waypoints = [(float(odom[1]), float(odom[0]), rest[0][2]), *rest]
+    waypoints = [(float(odom[1]), float(odom[0]), points[0][2]), *points]
     try:
         path = WaypointPath(kind='waypoints', waypoints=waypoints, **settings.path.ending())
-    except pydantic.ValidationError:  # it is there
+    except pydantic.ValidationError:
         return None
     return Order(at_s=at_s, path=path)
+
+
+def misses_end(settings: GuidanceSettings, stage, odom) -> np.ndarray:
+    """Whether it is up at the end of its path, and too far from its last point, bool[n].
+
+    ``stage``, int[n], and ``odom``, float64[n, ...], the numbers of the topic, are those of ticks.
+    """
+    path, at_end = settings.path, np.equal(stage, AT_END_OF_PATH)
+    if not at_end.any() or path.at_end != 'stop' or settings.profile.mode == 'path':
+        return np.zeros(len(at_end), bool)
+    north, east, _ = path.points(0)[-1]
+    off_m = np.hypot(odom[:, 1] - north, odom[:, 0] - east)
+    return at_end & (off_m > path.arrival_radius_m)
+
+
+def to_end(settings: GuidanceSettings, odom: Sequence[float], tick: int) -> Order | None:
+    """What guidance orders itself where it `misses_end`: to fly on to the last point."""
+    points = [tuple(map(float, settings.path.points(0)[-1]))]
+    return _to(points, settings, odom, round(tick * TICK_S, 1))
 
 
 def begins(no_progress: np.ndarray, before: float) -> np.ndarray:

@@ -241,7 +241,7 @@ class GuidanceSettings(GuidanceLawSettings):
         profile = self.profile.params(self.dives, pump_rate, polar, holds=self.hold)
         return GuidanceParams(
             path=self.path.params(),
-            path_id=zlib.crc32(self.path.model_dump_json().encode()),
+            path_id=zlib.crc32(self.path.model_dump_json(exclude={'arrival_radius_m'}).encode()),
             profile=profile,
             polar=polar,
             profile_speed=glide_horizontal_speed(profile.pitch, profile.glide_rate, polar),

@@ -34,8 +34,10 @@ from glider_guidance.orders import (
     check_orders,
     due,
     is_surfaced,
+    misses_end,
     reaction,
     ticks_alone,
+    to_end,
     wait_for_surface,
 )
 from glider_guidance.status import Status, status_of
@@ -197,13 +199,16 @@ class Held:
 
     def _until_ordered(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, but not beyond where an order waits for the surface, or is a reaction."""
+        before = held_state(self._held) if len(log) > 1 else None
+        rows, is_over = self._until_raised(log)
+        if before is None:
+            return rows, is_over
         waits = wait_for_surface(self.past.waiting, self.past.tick)
         reacts = self._settings.no_progress != 'tell'
-        before = held_state(self._held) if waits or reacts else None
-        rows, is_over = self._until_raised(log)
         up = np.flatnonzero(is_surfaced(log[:rows, _STAGE])) if waits else ()
         stays = begins(log[:rows, _NO_PROGRESS], self.past.no_progress) if reacts else ()
-        last = min((int(found[0]) + 1 for found in (up, stays) if len(found)), default=rows)
+        astray = np.flatnonzero(misses_end(self._settings, log[:rows, _STAGE], log[:rows, _ODOM]))
+        last = min((int(at[0]) + 1 for at in (up, stays, astray) if len(at)), default=rows)
         if last < rows:  # again, and no further
             set_held(self._held, before)
             rows, is_over = fly_held(self._held, log[:last], TICK_S)
@@ -225,6 +230,9 @@ class Held:
         self.past.stage, self.past.battery = int(row[_STAGE]), Battery(*row[_BATTERY].tolist())
         if self.past.no_progress and not before:
             order = reaction(self._settings, self.past.no_progress, row[_ODOM], self.past.tick)
+            self.past.own = (order,) if order else ()
+        if misses_end(self._settings, [self.past.stage], row[None, _ODOM])[0]:
+            order = to_end(self._settings, row[_ODOM], self.past.tick)
             self.past.own = (order,) if order else ()
 
     def _follow(self, order: Order) -> None:

@@ -190,9 +190,11 @@ class Scorer:
                 self._end, path_from = None, row
                 place = _place_of(log[row])
                 self._ordered.append((begin + row, place, order.path.params()))
-        at_end = path_from + np.flatnonzero(stage[path_from:] == AT_END_OF_PATH)
-        if self._end is None and len(at_end):
-            self._end = begin + int(at_end[0]), log[at_end[0]].copy()
+        away = np.flatnonzero(stage[path_from:] != AT_END_OF_PATH)
+        if len(away):  # who came up too far from it flies on
+            self._end, path_from = None, path_from + int(away[-1]) + 1
+        if self._end is None and path_from < len(log):
+            self._end = begin + path_from, log[path_from].copy()
 
     @property
     def ticks(self) -> int:

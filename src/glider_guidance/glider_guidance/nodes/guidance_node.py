@@ -5,6 +5,7 @@
 import re
 import sys
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from rcl_interfaces.msg import SetParametersResult
@@ -24,7 +25,7 @@ from glider_base.signals import Battery, Water
 from glider_base.wiring import MAP, SLOW_S, WHEN_SILENT
 from glider_guidance.block import GUIDANCE
 from glider_guidance.order import Order
-from glider_guidance.orders import changed, due, reaction
+from glider_guidance.orders import changed, due, misses_end, reaction, to_end
 from glider_guidance.status import status_of
 
 #: Number of points of the published path.
@@ -82,6 +83,9 @@ class GuidanceNode(BlockNode):
         no_progress = self.flags[2]
         if no_progress and not before:
             order = reaction(self.settings, no_progress, inputs[0], self.tick + 1)
+            self.waiting += [order] if order else []
+        if misses_end(self.settings, self.flags[:1], np.array(inputs[:1]))[0]:
+            order = to_end(self.settings, inputs[0], self.tick + 1)
             self.waiting += [order] if order else []
         if stamp_ns // SECOND_NS != self.second:
             self.second = stamp_ns // SECOND_NS
