@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numba.extending import overload
 
-from glider_base.kernel import kernel
+from glider_base.kernel import INLINED, kernel
 from glider_base.settings import Settings
 from glider_base.slot import slot
 from glider_base.wiring import Wired
@@ -79,7 +79,7 @@ def rows_at(arrays, row):
     return tuple(array[row] for array in arrays)
 
 
-@overload(rows_at)
+@overload(rows_at, jit_options=INLINED)
 def _rows_at(arrays, row):
     if len(arrays) == 0:
         return lambda arrays, row: ()

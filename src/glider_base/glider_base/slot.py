@@ -26,11 +26,9 @@ from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.extending import is_jitted, overload
 
 from glider_base.errors import ConfigurationError, shown
-from glider_base.kernel import kernel
+from glider_base.kernel import INLINED, kernel
 from glider_base.kernels.cache import BODIES, Body
 
-#: How the calls of slots are compiled.
-_INLINED = {'error_model': 'numpy', 'forceinline': True}
 #: What numba raises for a function that it cannot compile.
 NOT_COMPILED = (NumbaError, UnsupportedBytecodeError)
 
@@ -73,7 +71,7 @@ def slot(stub: Callable) -> Callable:
 
         return fill
 
-    @overload(call, jit_options=_INLINED, strict=False)
+    @overload(call, jit_options=INLINED, strict=False)
     def choose(*kinds):
         kind = kinds[position]
         found = find(getattr(kind, 'instance_class', type(kind)))
@@ -120,7 +118,7 @@ def checked(kernel: Callable, *what: str) -> Callable:
     def call(*values):
         return kernel(*values)
 
-    @overload(call, jit_options=_INLINED, strict=False)
+    @overload(call, jit_options=INLINED, strict=False)
     def choose(*kinds):
         _check(kernel, kinds, what)
         return lambda *values: kernel(*values)
