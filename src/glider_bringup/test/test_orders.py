@@ -14,12 +14,13 @@ from typer.testing import CliRunner
 import glider_bringup as glider
 from glider_base.settings import ConfigurationError
 from glider_bringup.cli import app
+from glider_guidance.yo.stage import WAITING_ON_SURFACE
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 SHALLOW = {'profile.depth_m': 200.0, 'dives': 0}
 EAST = {'kind': 'straight', 'course_deg': 90.0, 'length_m': 5000.0}
 #: Orders at odd times, one of each kind: in the first dive, held, resumed, aborted in the next
-#: dive. Short, as nodes fly it too.
+#: dive.
 ORDERS = [
     {'at_s': 60.0, 'depth_m': 15.0, 'pitch_deg': 25.0, 'wait_s': 30.0},
     {'at_s': 70.0, 'path': EAST, 'when': 'surfacing'},
@@ -28,6 +29,9 @@ ORDERS = [
     {'at_s': 425.0, 'abort': True},
 ]
 ORDERED_S = 640.0
+#: The same for nodes, which take long: each as soon as it changes something.
+SOON_S = (30.0, 35.0, 40.3, 175.0, 210.0)
+SOON = [{**one, 'at_s': at_s} for one, at_s in zip(ORDERS, SOON_S, strict=True)]
 YO = {'profile.depth_m': 20.0, 'profile.prepare_s': 0.0, 'dives': 0}
 
 
@@ -283,16 +287,22 @@ def test_given_in_flight_they_have_the_bits_of_those_in_the_scenario(flown):
         assert np.float64(flight.now[name]).tobytes() == np.float64(last[name].item()).tobytes()
 
 
-def test_nodes_follow_them_to_the_same_bits_and_verify_says_so(flown, tmp_path):
-    flight = {'scenario': 'current_8deg', 'set': {**YO, 'orders': ORDERS}, 'duration': ORDERED_S}
-    run = glider.fly(**flight, engine='nodes', bag=True, out=tmp_path / 'run')
-    nodes = run.to_xarray()
-    for name in flown.data_vars:
-        assert flown[name].values.tobytes() == nodes[name].values.tobytes(), name
-    direct = tmp_path / 'direct'
-    glider.fly(**flight, bag=True, out=direct)
+def test_nodes_follow_them_to_the_same_bits_and_verify_says_so(tmp_path):
+    flight = {'scenario': 'current_8deg', 'set': {**YO, 'orders': SOON}, 'duration': 220.0}
+    folders = {engine: tmp_path / engine for engine in ('direct', 'nodes')}
+    direct, nodes = (
+        glider.fly(**flight, engine=engine, bag=True, out=folder).to_xarray()
+        for engine, folder in folders.items()
+    )
+    for name in direct.data_vars:
+        assert direct[name].values.tobytes() == nodes[name].values.tobytes(), name
+    # up to be held, on the other path from there, to dive when resumed, up for good when aborted
+    depth, heading = direct['ground_truth_odom_depth'], direct['reference_heading']
+    assert depth.values[900] > 4.0 > 1.0 > depth.values[1700] and heading.values[-1] > 0.2
+    waits = direct['stage'].values[[1700, 2090, 2190]] == WAITING_ON_SURFACE
+    assert waits.tolist() == [True, False, True]
     told = []
-    for folder in (tmp_path / 'run', direct):
+    for folder in folders.values():
         done = CliRunner().invoke(app, ['verify', str(folder), '--json'])
         assert done.exit_code == 0 and json.loads(done.stdout)['identical'], done.output
         told.append(orders_in(folder))

@@ -97,7 +97,7 @@ def test_a_plan_ends_when_the_dives_of_its_mission_are_flown(capsys):
 def test_a_plan_tells_time_and_energy_of_a_flight_that_surfaces_and_of_one_that_does_not(
     every, depth_m, wait_s, bottom_m
 ):
-    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 20_000.0, 'at_end': 'stop'}
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 10_000.0, 'at_end': 'stop'}
     yo = {'profile.depth_m': depth_m, 'profile.surface_every_dives': every}
     yo |= {'profile.wait_s': wait_s, 'profile.clearance_m': 10.0, 'water.bottom_m': bottom_m}
     known = {'navigation.method': 'known', 'dives': 0, 'duration_s': 2e5}
