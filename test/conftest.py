@@ -64,5 +64,6 @@ def over_nodes(glider, tmp_path_factory) -> Recorded:
 def direct(glider, tmp_path_factory) -> Recorded:
     """The shared flight, by the direct engine, which writes the same bag."""
     return _fly(
-        glider, tmp_path_factory.mktemp('flight') / 'direct', '--engine', 'direct', '--bag'
+        *(glider, tmp_path_factory.mktemp('flight') / 'direct'),
+        *('--engine', 'direct', '--bag', '--no-report'),
     )

@@ -55,7 +55,7 @@ class Flying:
         self.out, self._texts = tmp_path / 'run', tmp_path
         self.nodes: dict[str, int] = {}
         self._expected = {*process_modules(layout), FORK_SERVER}
-        options = ['--processes'] if layout == 'processes' else []
+        options = ['--no-report', *(['--processes'] if layout == 'processes' else [])]
         self.process = start_glider(
             'run', 'rough_water', '--duration', 100000, '--out', self.out, '--json', *options
         )

@@ -132,7 +132,7 @@ def reckoned(glider, tmp_path_factory) -> dict[str, Path]:
     for name, folder in folders.items():
         done = glider(
             *('run', 'current_12deg', '--duration', RECKONED_S, *changes),
-            *('--engine', name, '--out', folder, *['--bag'] * (name == 'direct')),
+            *('--engine', name, '--out', folder, *['--bag'] * (name == 'direct'), '--no-report'),
         )
         assert done.returncode == 0, done.stderr
     return folders
@@ -188,7 +188,7 @@ def test_dead_reckoning_verifies(glider, reckoned, engine):
 def test_payloads_are_the_same_without_the_internals_of_rclpy(glider, over_nodes, tmp_path):
     done = glider(
         *('run', over_nodes.folder / 'scenario.yaml', '--engine', 'direct', '--bag'),
-        *('--duration', 30, '--out', tmp_path / 'direct'),
+        *('--duration', 30, '--out', tmp_path / 'direct', '--no-report'),
     )
     assert done.returncode == 0, done.stderr
     flown = flown_by(

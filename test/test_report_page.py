@@ -169,6 +169,16 @@ def browser():
 
 
 @pytest.fixture(scope='module')
+def without(browser):
+    """One that has no WebGL: what is in three dimensions takes it longest to draw."""
+    options = ['--no-sandbox', '--disable-gpu', '--disable-3d-apis']
+    with browser.browser_type.launch(
+        executable_path=browser_executable(), args=options
+    ) as running:
+        yield running
+
+
+@pytest.fixture(scope='module')
 def default_run(glider, tmp_path_factory):
     """Folder of the default scenario, flown whole."""
     folder = tmp_path_factory.mktemp('report') / 'default'
@@ -395,12 +405,12 @@ def check_reckoned(page, reckoned_run, width):
     assert page.evaluate(LEGEND_IS_APART, 'plan')
 
 
-def test_axes_of_a_steady_current_and_of_a_long_drift_can_be_read(browser, glider, tmp_path):
+def test_axes_of_a_steady_current_and_of_a_long_drift_can_be_read(without, glider, tmp_path):
     """Ended by the guard in the first dive of a current that no fix told of, then days adrift."""
     told = ('--duration', 120_000, '--set', 'water.bottom_m=60', '--out', tmp_path / 'run')
     done = glider('run', 'slocum_shelf', '--engine', 'direct', *told)
     assert done.returncode == 3, done.stderr
-    page, said, _ = open_page(browser, tmp_path / 'run' / 'report.html')
+    page, said, _ = open_page(without, tmp_path / 'run' / 'report.html')
     labels = page.evaluate(LABELS)
     assert '10,000' in labels, 'metres off the path'
     assert max(map(len, labels)) <= 8, 'all of it can be seen'
@@ -471,29 +481,26 @@ def test_report_on_paper(browser, default_run, tmp_path):
     page.close()
 
 
-def test_report_without_webgl(browser, default_run):
+def test_report_without_webgl(without, default_run):
     """A side view in place of the one in three dimensions, and no word of plotly's about it."""
-    options = ['--no-sandbox', '--disable-gpu', '--disable-3d-apis']
-    with browser.browser_type.launch(
-        executable_path=browser_executable(), args=options
-    ) as without:
-        page, said, asked = open_page(without, default_run / 'report.html')
-        panels = page.evaluate(DRAWN)
-        check_drawn(panels)
-        (side,) = (panel for panel in panels if panel['id'] == 'space')
-        assert side['kind'] == 'side'
-        (track,) = side['traces']
-        card = json.loads((default_run / 'score.json').read_text())
-        assert max(track['y']) == pytest.approx(card['depth_m']['max'], abs=0.1)
-        assert max(track['x']) == pytest.approx(card['distance_along_path_m'] / 1e3, rel=0.01)
-        figure = page.locator('figure', has=page.locator('#space'))
-        assert 'From the side' in figure.inner_text()
-        page.locator('#space').click()
-        assert len(page.context.pages) == 1, 'no other page opens'
-        text = page.evaluate('document.body.outerHTML.replaceAll(/<script[^]*?<.script>/g, "")')
-        assert 'webgl.org' not in text
-        assert page.locator('a').count() == 0
-        assert (said, len(asked)) == ([], 1)
+    page, said, asked = open_page(without, default_run / 'report.html')
+    panels = page.evaluate(DRAWN)
+    check_drawn(panels)
+    (side,) = (panel for panel in panels if panel['id'] == 'space')
+    assert side['kind'] == 'side'
+    (track,) = side['traces']
+    card = json.loads((default_run / 'score.json').read_text())
+    assert max(track['y']) == pytest.approx(card['depth_m']['max'], abs=0.1)
+    assert max(track['x']) == pytest.approx(card['distance_along_path_m'] / 1e3, rel=0.01)
+    figure = page.locator('figure', has=page.locator('#space'))
+    assert 'From the side' in figure.inner_text()
+    page.locator('#space').click()
+    assert len(page.context.pages) == 1, 'no other page opens'
+    text = page.evaluate('document.body.outerHTML.replaceAll(/<script[^]*?<.script>/g, "")')
+    assert 'webgl.org' not in text
+    assert page.locator('a').count() == 0
+    assert (said, len(asked)) == ([], 1)
+    page.close()
 
 
 def test_report_of_an_aborted_run(browser, start_glider, tmp_path):

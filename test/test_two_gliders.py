@@ -29,7 +29,7 @@ PER_TICK = [
 
 def start(domain: int, scenario: str, out: Path, *options) -> Started:
     """A run in a domain that is not its own."""
-    words = ('run', scenario, '--out', out, '--json', *options)
+    words = ('run', scenario, '--out', out, '--json', '--no-report', *options)
     said = out.parent / f'{out.name}_said'
     said.mkdir()
     return Started(words, node_environment(domain), said)
@@ -78,7 +78,7 @@ def test_a_glider_flies_as_if_it_were_alone(glider, together, tmp_path, name):
     assert (card['status'], card['messages_lost']) == ('completed', 0)
     done = glider(
         *('run', GLIDERS[name], '--duration', DURATION_S, '--out', tmp_path / 'alone'),
-        *('--engine', 'direct', '--bag'),
+        *('--engine', 'direct', '--bag', '--no-report'),
     )
     assert done.returncode == 0, done.stderr
     flown, alone = recorded(folder, f'/{name}/'), recorded(tmp_path / 'alone', '/glider/')
@@ -136,7 +136,7 @@ def test_a_second_glider_in_the_namespace_of_the_first_does_not_disturb_it(
     whole_s = card['ticks'] // 10 - 1  # the last ticks may have been cut short
     done = glider(
         *('run', 'current_8deg', '--duration', whole_s, '--out', tmp_path / 'alone'),
-        *('--engine', 'direct', '--bag'),
+        *('--engine', 'direct', '--bag', '--no-report'),
     )
     assert done.returncode == 0, done.stderr
     flown, alone = recorded(folder, '/glider/'), recorded(tmp_path / 'alone', '/glider/')
