@@ -26,7 +26,9 @@ LONG = (
     *('experiments_command', 'rudder', 'bottom', 'kills', 'montecarlo', 'lockstep', 'sweep'),
     *('slow_machine', 'verify', 'two_gliders', 'guard_flights', 'runner', 'mutants'),
     *('message_faults', 'live_view', 'driver_restart', 'forecasts', 'experiments', 'benchmarks'),
-    *('stability_map', 'vehicle_fields', 'soak'),
+    *('stability_map', 'vehicle_fields', 'soak', 'plan_command', 'model_water', 'report'),
+    *('routing', 'kernel_cache', 'real_vehicles', 'end_of_path', 'outcome', 'navigate', 'afloat'),
+    'fault_matrix',
 )
 
 
