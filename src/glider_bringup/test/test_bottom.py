@@ -112,6 +112,14 @@ def test_dives_turn_above_the_bottom():
     assert told['guard']['events'] == []
 
 
+@pytest.mark.parametrize('every', [0, 1])
+def test_dives_in_shallow_water_are_counted_by_its_depth(every):
+    """Of 15 m, or 5 m from turn to turn: they are the three that there were to be."""
+    fields = {'water.bottom_m': 25.0, 'profile.clearance_m': 10.0, 'profile.depth_m': 57.0}
+    told = flown(**{**fields, 'dives': 3, 'profile.surface_every_dives': every})
+    assert (told['status'], told['reason'], told['dives']) == ('completed', '', 3)
+
+
 def test_an_altimeter_alone_ends_the_mission_above_the_bottom():
     told = flown(**{'sensors.also_fitted': ['altitude']})
     assert told['status'] == 'surfaced'

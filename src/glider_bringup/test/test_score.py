@@ -279,6 +279,10 @@ def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
     assert on_the_way['left_m'] == pytest.approx(100.0, abs=1e-6)
     assert on_the_way['eta_s'] == pytest.approx(len(log) * TICK_S / 0.75, rel=1e-6)
     assert on_the_way['overrun_s'] == pytest.approx(on_the_way['eta_s'] - 70.0, rel=1e-6)
+    log[:, COLUMNS['ground_truth/odom'].start + 1] += 150.0  # beyond, and not at the surface
+    past = score(log, path=path, ends=True)['arrival']
+    assert (past['left_m'], past['eta_s']) == (0.0, pytest.approx(100.0, abs=0.2))
+    log[:, COLUMNS['ground_truth/odom'].start + 1] -= 150.0
     log[t > 50.0, COLUMNS['stage']] = AT_END_OF_PATH
     assert score(log, path=path, ends=False)['arrival'] is None
     told = score(log, path=path, ends=True)

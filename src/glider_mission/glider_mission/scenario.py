@@ -263,8 +263,11 @@ class Scenario(Settings):
 
     @property
     def shallowest_m(self) -> float:
-        """Depth of the shallowest dives that the vehicle is told to make (m)."""
-        return min([self.profile.depth_m, *(one.depth_m for one in self.orders if one.depth_m)])
+        """Depth of the shallowest dives that the vehicle is told to make, over a flat bottom (m)."""
+        depths, profile = [one.depth_m for one in self.orders if one.depth_m], self.profile
+        if profile.clearance_m and self.water.bottom_m and not self.bathymetry.file:
+            depths.append(max(profile.top_depth_m, self.water.bottom_m - profile.clearance_m))
+        return min(profile.depth_m, *depths, math.inf)
 
     def _afloat_s(self) -> float:
         """Time (s) afloat that ends a run: longer than any wait of its mission; 0: never."""

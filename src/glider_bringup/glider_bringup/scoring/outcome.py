@@ -140,7 +140,7 @@ def arrival_of(
         ways, made_m = rules.path.ways, come_m - behind_m - began_m
         left_m = float(max(0.0, ways[-1] - np.interp(come_m, rules.path.knots, ways) + behind_m))
         pace_s = (t_s - seconds(since)) / made_m if made_m >= LEAST_SHARE * length else None
-        eta_s = None if pace_s is None else t_s + (length - come_m + behind_m) * pace_s
+        eta_s = None if pace_s is None else t_s + max(0.0, length - come_m + behind_m) * pace_s
     return {
         'arrived': is_at_end and rules.has_arrived(missed_m),
         't_s': t_s if is_at_end else None,
