@@ -263,7 +263,7 @@ class Scenario(Settings):
 
     @property
     def shallowest_m(self) -> float:
-        """Depth of the shallowest dives that the vehicle is told to make, over a flat bottom (m)."""
+        """Depth of the shallowest dives that it is told to make, over a flat bottom (m)."""
         depths, profile = [one.depth_m for one in self.orders if one.depth_m], self.profile
         if profile.clearance_m and self.water.bottom_m and not self.bathymetry.file:
             depths.append(max(profile.top_depth_m, self.water.bottom_m - profile.clearance_m))
