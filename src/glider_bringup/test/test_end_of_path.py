@@ -261,6 +261,17 @@ def test_who_cannot_steer_has_not_followed_its_path_in_depth():
     assert (score['status'], score['arrival']['arrived']) == ('unfinished', False)
 
 
+def test_the_last_metres_are_not_dived_for_on_one_spot():
+    """29 m are left at its upper turn; dives of 2 m led nowhere, until its guard sent it up."""
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 1657.0}
+    changes = {'vehicle': 'slocum_g2', 'path': path, 'profile.depth_m': 115.0, 'dives': 0}
+    changes |= {'profile.net_heaviness_kg': 0.173, 'profile.pitch_deg': 16.0}
+    changes |= {'current.speed_kn': 0.1, 'current.direction_deg': 161.0, 'duration_s': 20000.0}
+    score = glider.fly('current_8deg', changes).score
+    assert (score['status'], score['guard']['events']) == ('completed', [])
+    assert score['arrival']['missed_m'] < 50.0
+
+
 def test_a_path_in_three_dimensions_ends_at_the_surface_too():
     """The path ends 20 m deep: it comes up from there, along its last course."""
     path = {'kind': 'waypoints', 'waypoints': [[0, 0, 10], [400, 0, 200], [900, 200, 20]]}

@@ -19,6 +19,8 @@ from glider_guidance.path.curve import path_piece, path_tangent
 LEAST_PROGRESS = 0.01
 #: So many of the last dives share the way that is left; those before go to the full depth.
 SHARED_DIVES = 2
+#: Another dive of less than this (m) makes nothing good: in it the vehicle only turns.
+LEAST_DIVE_M = 5.0
 
 
 class WayLeft(NamedTuple):
@@ -92,7 +94,8 @@ def next_dive(left, depth, surfaced, lead_s, dives, params):
     planned = top + 0.5 * rate * (made_good_s - turns_s)
     shallowest = shallowest_dive(params)
     # nor is a dive worth it that mostly makes up for what its turns lose to the current
-    if planned < shallowest or made_good_s < -turns_s:
+    worth_it = shallowest if dives == 0 else min(params.depth, top + LEAST_DIVE_M)
+    if planned < max(shallowest, worth_it) or made_good_s < -turns_s:
         return shallowest if dives == 0 else 0.0
     return params.depth if count == 1.0 else planned
 
