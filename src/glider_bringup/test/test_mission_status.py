@@ -81,6 +81,16 @@ def test_to_go_grows_for_who_is_carried_back():
     assert flight.status.eta_s == float('inf')
 
 
+def test_nobody_knows_when_one_arrives_that_holds_or_has_aborted():
+    flight = glider.Flight('current_8deg', {**DIVES, 'current.speed_kn': 0.0})
+    eta_s = [flight.until(t_s=t_s) and flight.status.eta_s for t_s in (900.0,)]
+    for asked in ('hold', 'resume', 'abort'):
+        flight.order(**{asked: True})
+        flight.step(10)
+        eta_s.append(flight.status.eta_s)
+    assert [math.isinf(one) for one in eta_s] == [False, True, False, True]
+
+
 def test_who_holds_is_told_when_it_is_up():
     flight = glider.Flight('current_8deg', DIVES)
     flight.until(t_s=900.0)

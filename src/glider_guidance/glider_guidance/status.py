@@ -42,6 +42,7 @@ def status_of(state: GuidanceState, params: GuidanceParams, battery: Battery) ->
     stay_s = TICK_S * (profile.wait_ticks + profile.prepare_ticks)
     dive_s, turns_s = _dive_s(profile), 2.0 * profile.lead_s
     share = (dive_s - turns_s) / (dive_s + stay_s / (profile.surface_every or math.inf))
+    stays = profile.holds or state.profile.aborted
     # in turns and stays the current acts on
     left = way_left(
         *(s, place.error.e1, share * params.profile_speed),
@@ -53,7 +54,7 @@ def status_of(state: GuidanceState, params: GuidanceParams, battery: Battery) ->
         leg=piece + 1,
         legs=len(path.knots) - 1,
         to_go_m=float(path.ways[-1] - way_m) - place.error.e1,
-        eta_s=float(left.glide_s),
+        eta_s=math.inf if stays else float(left.glide_s),
         speed_mps=math.hypot(place.ground_n, place.ground_e),
         current_north_mps=current.current_n,
         current_east_mps=current.current_e,
