@@ -89,7 +89,7 @@ class _PathSettings(Settings):
     arrival_radius_m: float = number(
         ARRIVAL_RADIUS_M,
         (MIN_LEG_M, MAX_DISTANCE_M),
-        'Who comes up farther than this from the last point (m) has not arrived, and flies on to it.',
+        'Who comes up farther from the last point (m) has not arrived, and flies on to it.',
     )
 
     def ending(self) -> dict[str, Any]:
