@@ -426,13 +426,13 @@ class Scenario(Settings):
 
     def _in_turn(self) -> list[GuidanceSettings]:
         """What guidance is told of its glides, by its mission and then by each order."""
-        told = [self.guidance_settings()]
+        held = [self.guidance_settings()]
         for order in sorted(self.orders, key=lambda one: one.tick):
             changes = {'depth_m': order.depth_m, 'pitch_deg': order.pitch_deg}
             if kept := {name: value for name, value in changes.items() if value is not None}:
-                profile = told[-1].profile.model_copy(update=kept)
-                told.append(told[-1].model_copy(update={'profile': profile}))
-        return told
+                profile = held[-1].profile.model_copy(update=kept)
+                held.append(held[-1].model_copy(update={'profile': profile}))
+        return held
 
     def _held_s(self) -> float:
         """Time (s) from each order to hold to that to resume; infinite if there is none."""
