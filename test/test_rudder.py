@@ -232,9 +232,10 @@ def test_its_runs_are_verified(machine, both):
     assert all(one['result'] == 'identical' for one in json.loads(done.stdout)['blocks'])
 
 
-def test_it_holds_a_straight_path_in_a_current(machine, both):
-    options = ['--set', 'duration_s=12000']
-    flown = machine.run('long', '--engine', 'direct', '--no-report', *options)
+@pytest.mark.parametrize('law', ['adaptive', 'pid'])
+def test_it_holds_a_straight_path_in_a_current(machine, both, law):
+    options = ['--controller', law, '--set', 'duration_s=12000']
+    flown = machine.run(f'long_{law}', '--engine', 'direct', '--no-report', *options)
     assert flown.card['status'] == 'completed'
     assert flown.card['cross_track_m']['max_steady'] < 5.0
     assert flown.card['guard']['events'] == []

@@ -31,8 +31,8 @@ from glider_guidance.nodes.guidance_node import GuidanceNode
 from glider_mission.scenario import load_scenario
 from glider_model.plant.block import plant_move, plant_outputs
 
-FLIGHT = {'profile.prepare_s': 0.0, 'profile.depth_m': 20.0}
-DURATION_S = 220.0
+FLIGHT = {'profile.prepare_s': 0.0, 'profile.depth_m': 40.0}
+DURATION_S = 400.0
 #: A cycle of the nodes for so many of the vehicle.
 EVERY = 2
 #: Simulated time at which the vehicle begins (ns).
@@ -142,8 +142,8 @@ def flight(tmp_path_factory):
 
 def test_it_dives_and_comes_up_again(flight):
     deepest = max(range(len(flight.depths)), key=flight.depths.__getitem__)
-    assert flight.depths[deepest] == pytest.approx(20.0, abs=5.0)
-    assert min(flight.depths[deepest:]) < 10.0
+    assert flight.depths[deepest] == pytest.approx(40.0, abs=5.0)
+    assert min(flight.depths[deepest:]) < 20.0
 
 
 def test_nothing_is_taken_for_a_fault(flight):

@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from copy import deepcopy
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
@@ -33,7 +34,7 @@ from glider_control.settings import LAWS, ControlLawSettings, ControlSettings, c
 from glider_guard.settings import GuardLimitSettings, GuardSettings
 from glider_guidance.guidance import path_time_s
 from glider_guidance.order import Order
-from glider_guidance.orders import check_orders
+from glider_guidance.orders import changed, check_orders
 from glider_guidance.path.settings import MAX_DEPTH_M, PathSettings, StraightPath
 from glider_guidance.settings import GuidanceLawSettings, GuidanceSettings
 from glider_guidance.yo.machine import ProfileSettings
@@ -267,7 +268,7 @@ class Scenario(Settings):
         depths, profile = [one.depth_m for one in self.orders if one.depth_m], self.profile
         if profile.clearance_m and self.water.bottom_m and not self.bathymetry.file:
             depths.append(max(profile.top_depth_m, self.water.bottom_m - profile.clearance_m))
-        return min(profile.depth_m, *depths, math.inf)
+        return min([profile.depth_m, *depths])
 
     def _afloat_s(self) -> float:
         """Time (s) afloat that ends a run: longer than any wait of its mission; 0: never."""
@@ -418,21 +419,16 @@ class Scenario(Settings):
         params, every = settings.params(), self.profile.surface_every_dives
         time_s = path_time_s(params, 0.0, 0.0)
         if params.profile.follows_path:  # it takes its time for the way down and up, too
-            depths = self.path.points(ALONG)[:, 2]
+            depths = settings.path.points(ALONG)[:, 2]
             time_s += float(np.sum(np.abs(np.diff(depths)))) / params.profile.glide_rate
         elif every:
             time_s += time_s / (2.0 * every * self._glide_s(settings)) * self._stay_s()
         return AMPLE * time_s / params.path.ways[-1]
 
     def _in_turn(self) -> list[GuidanceSettings]:
-        """What guidance is told of its glides, by its mission and then by each order."""
-        held = [self.guidance_settings()]
-        for order in sorted(self.orders, key=lambda one: one.tick):
-            changes = {'depth_m': order.depth_m, 'pitch_deg': order.pitch_deg}
-            if kept := {name: value for name, value in changes.items() if value is not None}:
-                profile = held[-1].profile.model_copy(update=kept)
-                held.append(held[-1].model_copy(update={'profile': profile}))
-        return held
+        """What guidance is told by its mission, and then by each order."""
+        orders = sorted(self.orders, key=lambda one: one.tick)
+        return list(accumulate(orders, changed, initial=self.guidance_settings()))
 
     def _held_s(self) -> float:
         """Time (s) from each order to hold to that to resume; infinite if there is none."""
