@@ -244,7 +244,7 @@ def test_attitude_that_is_none_is_refused_and_named(flight):
 
 
 def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(context):
-    flight = Flight(context, managed=True)
+    flight = Flight(context, managed=True, input_max_age_s=DEADLINE_S)
     vehicle, services = flight.vehicle, '/glider/navigation_node'
     change = vehicle.node.create_client(ChangeState, f'{services}/change_state')
     tell = vehicle.node.create_client(GetState, f'{services}/get_state')
@@ -288,6 +288,13 @@ def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(
         vehicle.odom.clear()
         flight.until(lambda: len(vehicle.odom) > 5)
         assert abs(vehicle.north_m()) < 20.0  # it knows nothing
+        # it begins anew also if nothing has come since it was silenced
+        vehicle.silent = {'joint_states'}
+        flight.wait(0.5)
+        for label in ('deactivate', 'cleanup', 'configure', 'activate'):
+            state_after(label)
+        vehicle.odom.clear()
+        flight.go_on(2)
         with pytest.raises(Stop):
             state_after('shutdown')
             flight.wait(DEADLINE_S)

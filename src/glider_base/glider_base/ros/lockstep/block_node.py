@@ -66,10 +66,10 @@ class BlockNode(StepNode, LifecycleNodeMixin):
 
     def forget(self) -> None:
         """Know nothing, as at the start."""
+        super().forget()
         self.state = self.settings.initial_state()
         self.telling = Telling(self.block)
-        self.said = (0, ())  #: stamp and numbers of the last answer
-        self.flags: tuple[int, ...] | None = None  #: and its flags
+        self.flags: tuple[int, ...] | None = None  #: of the last answer
 
     def on_ready(self) -> None:
         """Begin, or offer the services of a managed node."""
@@ -159,6 +159,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
                 raise Stop(EXIT_FAILED, at_tick(raised(error), tick)) from error
         if self.block.say and self.telling.is_due(flags, stamp_ns):
             self.tell(stamp_ns, flags)
+        #: the last answer: its stamp, and the numbers
         self.said, self.flags = (stamp_ns, outputs), flags
         self.repeat()
 

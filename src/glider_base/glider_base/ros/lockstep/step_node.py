@@ -63,10 +63,13 @@ class StepNode(TickNode):
         self.missed = 0  #: those of them that there were not: the machine was too slow
         self.passed = 1  #: ticks that have passed since the last step, this one included
         self._cycle_s: float | None = None
-        self._passing = Passing(self.ticks.input_max_age_s)
         self._stood = (0.0, time.monotonic())  #: time of the cycles, and since when it is that (s)
         self._told = (0, 0, 0)
         self._tell_s = -float('inf')
+
+    def forget(self) -> None:
+        """Know nothing, as at the start: the next cycle is a step, whatever its stamp."""
+        self._passing = Passing(self.ticks.input_max_age_s)
 
     def on_ready(self) -> None:
         """Start the timer of the free-running mode, on simulated time if that is used."""
