@@ -63,6 +63,7 @@ class StepNode(TickNode):
         self.missed = 0  #: those of them that there were not: the machine was too slow
         self.passed = 1  #: ticks that have passed since the last step, this one included
         self._cycle_s: float | None = None
+        StepNode.forget(self)  # its own alone: a subclass has made nothing yet
         self._stood = (0.0, time.monotonic())  #: time of the cycles, and since when it is that (s)
         self._told = (0, 0, 0)
         self._tell_s = -float('inf')
