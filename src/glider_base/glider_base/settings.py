@@ -310,13 +310,9 @@ def _refuse_flags_for_numbers(model: type[Settings], values: Any, source: str) -
             raise ConfigurationError(f'{source}: {name} = {flag}: no number (allowed: a number)')
 
 
-def file_names(folder: Path) -> list[str]:
-    """Names of the YAML files that come with a package in ``folder``."""
-    return [*_stems(folder)]
-
-
 @cache
-def _stems(folder: Path) -> tuple[str, ...]:
+def file_names(folder: Path) -> tuple[str, ...]:
+    """Names of the YAML files that come with a package in ``folder``."""
     return tuple(sorted(path.stem for path in folder.glob('*.yaml')))
 
 

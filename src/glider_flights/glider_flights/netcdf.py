@@ -135,20 +135,15 @@ def _in_ours(
     if key.endswith('time'):
         return _seconds(name, values, unit)
     if scales and key in _USUAL and unit not in scales:
-        _refuse_unit(name, unit, key)
+        usual, spelt = _USUAL[key]
+        if not re.fullmatch(spelt, unit.strip(), re.IGNORECASE):
+            raise ConfigurationError(f'{name} is in {unit!r} (allowed: {usual})')
     if key == 'depth_m' and attrs.get('positive') == 'up':
         scale = -scale
     values = values * math.copysign((scales or {}).get(unit, scale), scale)
     lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
     values[(values < lowest) | (values > highest)] = math.nan
     return values
-
-
-def _refuse_unit(name: str, unit: str, key: str) -> None:
-    """Refuse what is in none of the spellings of the unit in `variables.yaml`, if in any."""
-    usual, spelt = _USUAL[key]
-    if not re.fullmatch(spelt, unit.strip(), re.IGNORECASE):
-        raise ConfigurationError(f'{name} is in {unit!r} (allowed: {usual})')
 
 
 def refuse_missing(path: Path, found: dict, needed: Names, why: str) -> None:

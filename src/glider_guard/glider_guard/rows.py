@@ -230,12 +230,9 @@ def row(bit, holds):
     return bit if holds else 0
 
 
-def bits_of(reaction: int) -> int:
-    """Sum of the bits of the rows with a reaction."""
-    return sum(row.bit for row in ROWS if row.reaction == reaction)
-
-
-HOLDS, SURFACES, DROPS = (bits_of(one) for one in (HOLD, SURFACE, DROP))
+HOLDS, SURFACES, DROPS = (
+    sum(row.bit for row in ROWS if row.reaction == one) for one in (HOLD, SURFACE, DROP)
+)
 #: While one of these holds the depth is not believed.
 BLIND = FROZEN | LOST | DISAGREES | DEPTH_WRONG
 LATCHED = sum(row.bit for row in ROWS if row.latches)

@@ -48,6 +48,7 @@ def status_of(state: GuidanceState, params: GuidanceParams, battery: Battery) ->
         *(s, place.error.e1, share * params.profile_speed),
         *(current.current_n, current.current_e, math.inf, path),
     )
+    is_measured = battery.voltage >= 0.0 and battery.charge >= 0.0
     return Status(
         t_s=state.tick * TICK_S,
         stage=STAGE_NAMES[state.profile.stage],
@@ -60,14 +61,8 @@ def status_of(state: GuidanceState, params: GuidanceParams, battery: Battery) ->
         current_east_mps=current.current_e,
         next_surfacing_s=_to_surface_s(state.profile, place.depth, profile),
         dives=state.profile.dives,
-        energy_left_wh=_left_wh(battery),
+        energy_left_wh=battery.voltage * battery.charge if is_measured else math.inf,
     )
-
-
-def _left_wh(battery: Battery) -> float:
-    """Energy that is left in a battery (Wh); infinite if it is not measured."""
-    is_measured = battery.voltage >= 0.0 and battery.charge >= 0.0
-    return battery.voltage * battery.charge if is_measured else math.inf
 
 
 def _dive_s(params: ProfileParams) -> float:

@@ -239,11 +239,12 @@ class Scenario(Settings):
 
     def plant_settings(self) -> PlantSettings:
         """What the plant node is told."""
+        chart = self.bathymetry
         return _settings_of(
             PlantSettings,
             self,
             water=self.resolved_water(),
-            bathymetry=self._bathymetry(),
+            bathymetry=chart.resolved(self.mission()) if chart.file else chart,
             dives=0 if self._holds else self.dives,
             dive_depth_m=self.shallowest_m,
             afloat_s=self._afloat_s(),
@@ -292,11 +293,6 @@ class Scenario(Settings):
         if not grid.file:
             return self.water
         return self.water.model_copy(update={'grid': grid.resolved(self.mission())})
-
-    def _bathymetry(self) -> BathymetrySettings:
-        """Chart of the bottom, which knows where the mission is, if there is one."""
-        chart = self.bathymetry
-        return chart.resolved(self.mission()) if chart.file else chart
 
     def bottom(self) -> NamedTuple:
         """Kernel parameters of the bottom."""
@@ -394,7 +390,7 @@ class Scenario(Settings):
             path=self.path.params(),
             ends=self.path.at_end == 'stop',
             arrival_radius_m=self.path.arrival_radius_m,
-            pace_s=self._pace_s(),
+            pace_s=max(self._pace_s(settings) for settings in self._in_turn()),
             spare_s=self._held_s() if self.profile.mode == 'path' else dive_s,
             duration_s=self.duration_s,
             origin=self.origin.params() if self.is_charted else None,
@@ -410,12 +406,11 @@ class Scenario(Settings):
         slowest_s = max(self._glide_s(settings) for settings in self._in_turn())
         return AMPLE * 2.0 * slowest_s + self._stay_s() + self._held_s()
 
-    def _pace_s(self) -> float:
-        """Time (s) that is ample for a metre of its path and its stays, in still water."""
-        return max(self._pace_of(settings) for settings in self._in_turn())
+    def _pace_s(self, settings: GuidanceSettings) -> float:
+        """Time (s) that is ample for a metre of its path and its stays, in still water.
 
-    def _pace_of(self, settings: GuidanceSettings) -> float:
-        """The same with what guidance is told at one time."""
+        That is by what guidance is told at one time.
+        """
         params, every = settings.params(), self.profile.surface_every_dives
         time_s = path_time_s(params, 0.0, 0.0)
         if params.profile.follows_path:  # it takes its time for the way down and up, too
@@ -513,7 +508,7 @@ def _kind(values: dict[str, Any]) -> type[Scenario]:
 
 def scenario_names() -> list[str]:
     """Names of the scenarios that come with the package."""
-    return file_names(SCENARIO_FOLDER)
+    return [*file_names(SCENARIO_FOLDER)]
 
 
 def scenario_path(name: str | Path) -> Path:
@@ -593,7 +588,13 @@ def make_scenario(
                 lines.append(str(other))
         raise ConfigurationError('\n'.join(lines)) from None
     name = changed_vehicle(_vehicle_called(scenario.vehicle, path.parent, in_line), in_vehicle)
-    scenario = _with_vehicle(scenario, name, f'{path}{changed}')
+    vehicle = load_vehicle(name)
+    with named_in(f'{path}{changed}: '):  # good, wherever nodes are started from
+        perturbed(vehicle.params(), scenario.perturb)
+        scenario.control.steering(vehicle.steers_by)
+        gyro, topics = scenario.sensors.gyro, scenario.topics
+        check_fitted(scenario.faults, vehicle.steers_by, topics, gyro)
+    scenario = scenario.model_copy(update={'vehicle': name})
     if not recorded:
         with named_in(f'{path}{changed}: '):
             _check_glide(scenario)
@@ -722,17 +723,6 @@ def named_in(what: str, kind: type[ValueError] = ConfigurationError) -> Iterator
         yield
     except kind as error:
         raise ConfigurationError(f'{what}{error}') from None
-
-
-def _with_vehicle(scenario: Scenario, name: str, source: str) -> Scenario:
-    """Scenario whose vehicle is known to be good, wherever nodes are started from."""
-    vehicle = load_vehicle(name)
-    with named_in(f'{source}: '):
-        perturbed(vehicle.params(), scenario.perturb)
-        scenario.control.steering(vehicle.steers_by)
-        gyro, topics = scenario.sensors.gyro, scenario.topics
-        check_fitted(scenario.faults, vehicle.steers_by, topics, gyro)
-    return scenario.model_copy(update={'vehicle': name})
 
 
 def _vehicle_called(name: str, folder: Path, source: str) -> str:

@@ -168,8 +168,10 @@ class Held:
         """Fill a log, float64[n, ROW]; rows filled, and whether the mission has ended."""
         filled, is_over = 0, False
         while filled < len(log) and not is_over:
-            if self._pilot:
-                self._ask(self._pilot)
+            if self._pilot and self.past.tick % LOOK_TICKS == 0:
+                if order := self._pilot.order(self.past.tick, self._row):
+                    for one in (self, *self._hearers):
+                        one.order(order)
             orders = due((*self.past.waiting, *self.past.own), self.past.tick, self.past.stage)
             for follower in self._followers if orders else ():
                 follower.follow(self.past.tick, orders)
@@ -189,13 +191,6 @@ class Held:
             self.past.tick += flown
             self._look(log[filled - 1])
         return filled, is_over
-
-    def _ask(self, pilot: Pilot) -> None:
-        """Take in the order that a pilot gives now, if any."""
-        tick = self.past.tick
-        if tick % LOOK_TICKS == 0 and (order := pilot.order(tick, self._row)):
-            for one in (self, *self._hearers):
-                one.order(order)
 
     def _until_ordered(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, but not beyond where an order waits for the surface, or is a reaction."""

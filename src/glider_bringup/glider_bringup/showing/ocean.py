@@ -71,14 +71,11 @@ def look(file: Path) -> tuple[dict[str, Any], Sea]:
         'mission': None,
     }
     seen = {name: part.seen for name, part in found.parts.items() if part.seen}
-    panels = [panel for name, one in seen.items() for panel in _panels(name, _uppermost(one))]
+    panels = []
+    for name, one in seen.items():
+        axes = one.axes._replace(depths=one.axes.depths[:1])
+        panels += _panels(name, one._replace(axes=axes, water=one.water[:, :1]))
     return listing, Sea(file.name, panels, None)
-
-
-def _uppermost(seen: Loaded) -> Loaded:
-    """The same with one level."""
-    axes = seen.axes._replace(depths=seen.axes.depths[:1])
-    return seen._replace(axes=axes, water=seen.water[:, :1])
 
 
 def _listed(name: str, part: Part) -> dict[str, Any]:

@@ -76,13 +76,6 @@ def pack(data: bytes) -> str:
     return base64.b64encode(zlib.compress(data, _LEVEL)).decode('ascii')
 
 
-def pack_arrays(arrays: dict[str, np.ndarray]) -> dict[str, Any]:
-    """Arrays as text: float32, all first bytes of them first, which packs tighter."""
-    numbers = np.concatenate([np.asarray(values, '<f4') for values in arrays.values()])
-    data = pack(numbers.view(np.uint8).reshape(-1, 4).T.tobytes())
-    return {'lengths': {name: len(values) for name, values in arrays.items()}, 'data': data}
-
-
 class FlownRun(NamedTuple):
     """A run as pages show it."""
 
@@ -134,10 +127,14 @@ class FlownRun(NamedTuple):
             for name in SAMPLES
             if not name.startswith('believed_') or np.any(np.isfinite(traces.samples[name]))
         }
+        # float32, all first bytes of them first, which packs tighter
+        numbers = np.concatenate([np.asarray(values, '<f4') for values in arrays.values()])
+        data = pack(numbers.view(np.uint8).reshape(-1, 4).T.tobytes())
+        lengths = {name: len(values) for name, values in arrays.items()}
         return {
             'label': self.label,
             'spacing': traces.spacing_s,
-            'packed': pack_arrays(arrays),
+            'packed': {'lengths': lengths, 'data': data},
             'inflections': [round(float(time), 3) for time in traces.inflections_s()],
             'path': self.path_points(),
             'origin': self.rules.origin and self.rules.origin._asdict(),
@@ -146,15 +143,10 @@ class FlownRun(NamedTuple):
         }
 
 
-def time_unit(duration_s: float) -> tuple[str, float]:
-    """Name and length (s) of the unit in which a person counts so much time."""
-    return next((name, unit) for least, name, unit in _TIME_UNITS if duration_s >= least)
-
-
 def page_data(runs: list[FlownRun], panels: list[Panel]) -> dict[str, Any]:
     """What the page's script needs to draw these panels."""
     duration_s = max(run.card['sim_time_s'] for run in runs)
-    unit, seconds = time_unit(duration_s)
+    unit, seconds = next((name, s) for least, name, s in _TIME_UNITS if duration_s >= least)
     names: list[set[str]] = [set() for _ in runs]
     for curve in (curve for panel in panels for curve in panel.curves):
         names[curve.run] |= {curve.name, curve.flag} - {''}

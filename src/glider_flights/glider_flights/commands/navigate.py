@@ -75,8 +75,9 @@ def _segments_table(flight, rows) -> Table:
         table.add_column(name, justify='right', no_wrap=True)
     for row in rows:
         own, other = row.comparable_mps, row.segment.on_board.dac_mps
+        name = Path(row.segment.name).stem
         table.add_row(
-            _short(row.segment.name),
+            name if len(name) <= MAX_NAME else f'…{name[1 - MAX_NAME :]}',
             f'{row.seconds / 3600.0:.1f}',
             f'{row.segment.samples.depth_m.max():.0f}',
             f'{np.hypot(*row.way_m):.0f}',
@@ -87,11 +88,6 @@ def _segments_table(flight, rows) -> Table:
             _number(row.missed_m['ours'], 0),
         )
     return table
-
-
-def _short(name: str) -> str:
-    stem = Path(name).stem
-    return stem if len(stem) <= MAX_NAME else f'…{stem[1 - MAX_NAME :]}'
 
 
 def _current(mps: np.ndarray) -> str:

@@ -89,7 +89,9 @@ class ProfileSettings(Settings):
         climb_rate = -glide_vertical_rate(climb_pitch, -light, polar)
         if (climb_pitch, light) == (pitch, heavy):
             climb_rate = dive_rate
-        rate = _mean_rate(dive_rate, climb_rate)
+        rate = dive_rate
+        if climb_rate != dive_rate:  # one that takes as long down and up as the two do
+            rate = 2.0 * dive_rate * climb_rate / (dive_rate + climb_rate)
         top_depth = min(self.top_depth_m, 0.5 * self.depth_m)
         return derived(
             ProfileParams,
@@ -112,13 +114,6 @@ class ProfileSettings(Settings):
             * (heavy if light == heavy else 0.5 * (heavy + light))
             / pump_rate_kgps,
         )
-
-
-def _mean_rate(dive_rate: float, climb_rate: float) -> float:
-    """Rate (m/s) that takes as long down and up as two rates do; that of both if they are one."""
-    if dive_rate == climb_rate:
-        return dive_rate
-    return 2.0 * dive_rate * climb_rate / (dive_rate + climb_rate)
 
 
 class ProfileParams(NamedTuple):

@@ -119,15 +119,6 @@ class SensorSettings(Settings):
         charted = self.chart_declination_deg
         return self.declination_deg if charted is None else charted
 
-    def _imu_errors(self) -> 'ImuErrors':
-        wrong = self.charted_deg - self.declination_deg
-        return derived(
-            ImuErrors,
-            self,
-            compass_bias=math.radians(self.compass_bias_deg + wrong),
-            compass_phase=math.radians(self.compass_deviation_phase_deg - self.declination_deg),
-        )
-
     def params(
         self,
         seed: int,
@@ -136,6 +127,13 @@ class SensorSettings(Settings):
     ) -> 'SensorParams':
         """Kernel parameters for the errors under one seed, for the sensors that are fitted."""
         pattern = self.fix_missed_pattern
+        wrong = self.charted_deg - self.declination_deg
+        errors = derived(
+            ImuErrors,
+            self,
+            compass_bias=math.radians(self.compass_bias_deg + wrong),
+            compass_phase=math.radians(self.compass_deviation_phase_deg - self.declination_deg),
+        )
         altimeter = AltimeterParams(
             'altitude' in fitted,
             self.altimeter_std_m,
@@ -147,7 +145,7 @@ class SensorSettings(Settings):
             SensorParams,
             self,
             stream=np.uint64(random_stream(seed, _STREAM_OFFSET, 0)),
-            errors=self._imu_errors(),
+            errors=errors,
             period_ticks=round(self.imu_period_s / TICK_S),
             gps=GpsParams(
                 stream=np.uint64(random_stream(seed, _STREAM_OFFSET, 1)),

@@ -409,7 +409,7 @@ def mass_fault(vehicle: VehicleParams) -> str:
 
 def vehicle_names() -> list[str]:
     """Names of the vehicles that come with the package."""
-    return file_names(VEHICLE_FOLDER)
+    return [*file_names(VEHICLE_FOLDER)]
 
 
 def changed_vehicle(name: str, changes: dict[str, Any]) -> str:

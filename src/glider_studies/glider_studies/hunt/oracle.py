@@ -182,7 +182,11 @@ def _late(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
         return ''
     sent_up, depth = int(np.argmax(surfaces)), truth.depth
     struck = [round(one) for one in sorted(begun_s) if sent_up < one < len(depth) - 1.0]
-    struck = [_sinks_s(depth, one) for one in struck if depth[one] < AT_SURFACE_M]
+    struck = [
+        one + int(np.argmax(depth[one:] > SINKS_AGAIN_M))
+        for one in struck
+        if depth[one] < AT_SURFACE_M
+    ]
     for start, end in pairwise([sent_up, *struck, len(depth)]):
         limit_s = due_s(float(depth[start]))
         late = depth[start + round(limit_s) : end]
@@ -192,12 +196,6 @@ def _late(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
         if any((depths[round(limit_s / TICK_S) :] < AT_SURFACE_M).all() for depths in best):
             return f'{late.max():.0f} m deep {limit_s:.0f} s after it was sent up at {start} s'
     return ''
-
-
-def _sinks_s(depth: np.ndarray, from_s: int) -> int:
-    """When (s) a vehicle that is up at some time (s) goes under; that time if it never does."""
-    under = depth[from_s:] > SINKS_AGAIN_M
-    return from_s + int(np.argmax(under))
 
 
 def _is_under(depth: np.ndarray) -> bool:

@@ -260,7 +260,11 @@ class Plan:
         # every value of every dimension, the first cell's first
         checked = [one for number in range(len(self.axes)) for one in self.along(number)]
         #: digests of the scenarios of all values
-        self.scenarios = [_digest(one) for one in checked]
+        self.scenarios = []
+        for one in checked:  # whose vehicle has no folder
+            described = one.model_copy(update={'vehicle': vehicle_path(one.vehicle).stem})
+            digest = hashlib.sha256(described.model_dump_json().encode()).hexdigest()
+            self.scenarios.append(digest)
         #: laws and methods that cells may have
         found = [combination_of(one) for one in checked]
         steered = {steers_by(one): its.steered for one, its in zip(checked, found, strict=True)}
@@ -357,12 +361,6 @@ class Plan:
         return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def _digest(scenario: Scenario) -> str:
-    """Digest of a scenario, whose vehicle has no folder, with what it has of files."""
-    described = scenario.model_copy(update={'vehicle': vehicle_path(scenario.vehicle).stem})
-    return hashlib.sha256(described.model_dump_json().encode()).hexdigest()
-
-
 def vehicle_digest(vehicle: str) -> str:
     """Digest of the file of a vehicle given by name or path, without what is changed in it."""
     return hashlib.sha256(read_text(vehicle_path(vehicle)).encode()).hexdigest()
@@ -373,7 +371,7 @@ def vehicle_digest(vehicle: str) -> str:
 
 def sweep_names() -> list[str]:
     """Names of the sweeps that come with the package."""
-    return file_names(SWEEP_FOLDER)
+    return [*file_names(SWEEP_FOLDER)]
 
 
 def _validate(path: Path, values: dict[str, Any] | None = None) -> Sweep:

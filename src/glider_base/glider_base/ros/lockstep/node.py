@@ -247,17 +247,13 @@ class TickNode(Node):
         """What is missing between this node and its peers, in words; empty if all is matched."""
         missing = self.rivals()
         for topic, publisher in self.outputs.values():
-            missing += peers.missing_readers(self, topic, publisher, self._readers(topic))
+            readers = list(topic.readers) if self.ticks.lockstep else []
+            if self.ticks.record and topic.recorded and self.get_name() != topics.RECORDER:
+                readers.append(topics.RECORDER)
+            missing += peers.missing_readers(self, topic, publisher, readers)
         for item in self.inputs:
             missing += peers.missing_publisher(self, item)
         return missing
-
-    def _readers(self, topic: Topic) -> list[str]:
-        """Nodes that have to read an output before this node may begin."""
-        readers = list(topic.readers) if self.ticks.lockstep else []
-        if self.ticks.record and topic.recorded and self.get_name() != topics.RECORDER:
-            readers.append(topics.RECORDER)
-        return readers
 
     def _on_startup(self) -> None:
         missing = self.unmatched() if self.ticks.lockstep else []

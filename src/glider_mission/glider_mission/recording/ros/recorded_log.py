@@ -47,21 +47,17 @@ def known_topics(namespace: str) -> dict[str, Topic]:
     return known | {f'{namespace.rstrip("/")}/clock': TOPICS['/clock']}
 
 
-def _stage_number(name: str) -> float:
-    """Number of a stage; NaN for one that this version does not know."""
-    return float(STAGE_NAMES.index(name)) if name in STAGE_NAMES else np.nan
-
-
 def _mask(text: str) -> float:
     """Sum of bits; 0 for what is none."""
     return float(int(text)) if text.isdecimal() and len(text) < 10 else 0.0
 
 
-#: Columns of a row that events on /diagnostics tell, by their keys, and how they are read.
+#: Columns of a row that events on /diagnostics tell, by their keys, and how they are read. NaN is
+#: a stage that this version does not know.
 _FLAGS = {
     'infeasible': lambda text: float(text == 'true'),
     'no_progress': _mask,
-    'stage': _stage_number,
+    'stage': lambda text: float(STAGE_NAMES.index(text)) if text in STAGE_NAMES else np.nan,
     'saturation': _mask,
     'guard': _mask,
 }
@@ -213,7 +209,10 @@ class RecordedLog:
         missing = np.flatnonzero(np.any(np.isnan(numbers), axis=1))
         rows = int(missing[0]) if len(missing) else BLOCK_TICKS
         if len(missing):
-            self._over, self.lacks = True, self._what_lacks(rows)
+            tick, name = self._start + rows, self._needed[np.argmax(np.isnan(numbers[rows]))]
+            why = self._unusable.get((name, tick), 'not recorded')
+            self.lacks = f'tick {tick:,} (t = {tick * TICK_NS / 1e9:.1f} s) lacks {name}: {why}'
+            self._over = True
         block[:, [COLUMNS[name] for name in _FLAGS if name != 'stage']] = 0.0
         for tick, column, value in self._flags:
             block[max(0, tick - self._start) :, COLUMNS[column]] = value
@@ -222,13 +221,6 @@ class RecordedLog:
         self._begun = max(0, self._begun - BLOCK_TICKS)
         self._log[: self._begun] = self._log[BLOCK_TICKS:][: self._begun]
         self._start += BLOCK_TICKS
-
-    def _what_lacks(self, row: int) -> str:
-        """Why a tick is not whole, in words."""
-        tick, has = self._start + row, ~np.isnan(self._log[row])
-        names = [name for name in self._needed if not has[COLUMNS[name].start]]
-        why = self._unusable.get((names[0], tick), 'not recorded')
-        return f'tick {tick:,} (t = {tick * TICK_NS / 1e9:.1f} s) lacks {names[0]}: {why}'
 
     def missing(self, ticks: int | None) -> str:
         """What lacks of a run, in words; empty if nothing does.

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Publishes a recording again: the same bytes, on the same topics, in the same order."""
 
-import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -226,14 +225,10 @@ class _Brake:
             message = take(self._subscription)
             if message is not None:
                 self._recorded_ns = Time.from_msg(message.stamp).nanoseconds
-            elif self._is_recorded():
+            elif self._node.count_publishers(self._word) > 0:  # a recorder in lockstep listens
                 time.sleep(0.001)
             else:
                 self._recorded_ns = log_ns
-
-    def _is_recorded(self) -> bool:
-        """Whether a recorder in lockstep listens: it alone says what it has on disk."""
-        return self._node.count_publishers(self._word) > 0
 
 
 class _Count:
@@ -295,6 +290,7 @@ class Replay:
             for index, name in plan.names.items()
         }
         clock, has_clock = TOPICS['/clock'], '/clock' in plan.names.values()
+        # published by the log times of a recording that has none
         self._own_clock = (
             None if has_clock else node.create_publisher(clock.message_type, clock.name, clock.qos)
         )
@@ -315,16 +311,20 @@ class Replay:
     def run(self, progress: Progress) -> dict[str, Any]:
         """Publish everything once; returns the ``counts`` of messages by topic, and ``wall_s``."""
         began_s = time.monotonic()
-        self._clock_ns = -TICK_NS
+        clock_ns = -TICK_NS
         span_s = (self._plan.end_ns - self._plan.start_ns) / 1e9
         shown_s = 0.0
         for log_ns, index, raw in recorded_messages(self._plan):
             passed_s = (log_ns - self._plan.start_ns) / 1e9
-            if math.isfinite(self._rate):
-                self._sleep_until(began_s + passed_s / self._rate, passed_s, progress)
+            due_s = began_s + passed_s / self._rate
+            while (left_s := due_s - time.monotonic()) > 0.0:
+                time.sleep(min(left_s, _PATIENCE_S))
+                progress(passed_s - max(0.0, due_s - time.monotonic()) * self._rate)
             self._brake.wait(log_ns)
             self._count.add(log_ns, self._plan.names[index])
-            self._tell_time(log_ns)
+            if self._own_clock is not None and log_ns - clock_ns >= TICK_NS:
+                clock_ns = log_ns
+                self._own_clock.publish(TOPICS['/clock'].codec.encode(log_ns, ()))
             self._outputs[index].publish(raw)
             now_s = time.monotonic()
             if now_s - shown_s > _PATIENCE_S:
@@ -337,17 +337,6 @@ class Replay:
         progress(span_s)
         counts = {output.name: output.count for output in self._outputs.values()}
         return {'counts': counts, 'wall_s': time.monotonic() - began_s}
-
-    def _sleep_until(self, due_s: float, passed_s: float, progress: Progress) -> None:
-        while (left_s := due_s - time.monotonic()) > 0.0:
-            time.sleep(min(left_s, _PATIENCE_S))
-            progress(passed_s - max(0.0, due_s - time.monotonic()) * self._rate)
-
-    def _tell_time(self, log_ns: int) -> None:
-        """Publish /clock by the log times of a recording that has none."""
-        if self._own_clock is not None and log_ns - self._clock_ns >= TICK_NS:
-            self._clock_ns = log_ns
-            self._own_clock.publish(TOPICS['/clock'].codec.encode(log_ns, ()))
 
 
 def recorded_messages(plan: Plan) -> Iterator[tuple[int, int, bytes]]:

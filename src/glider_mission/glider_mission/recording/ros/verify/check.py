@@ -16,7 +16,7 @@ from glider_base.block import Telling
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.health import ABORT, CLEAR, PARAMETERS_SET, SURFACE
 from glider_base.ros.parameters import with_parameters
-from glider_base.ros.wire.codec import Codec, cdr_places, to_cdr
+from glider_base.ros.wire.codec import cdr_places, to_cdr
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_guidance.nodes.guidance_node import PATH_POINTS, path_message
@@ -180,9 +180,9 @@ class Check:
             row = int(found[0])
             raw = track.series.payload(int(index[row]))
             stamp_ns = int(self.stamps_ns[start + row])
-            self.found.append(
-                message_difference(name, track.series.codec, stamp_ns, values[row], raw)
-            )
+            codec = track.series.codec
+            expected = deserialize_message(codec.encode(stamp_ns, values[row]), codec.message_type)
+            self.found.append(Difference(stamp_ns, name, *field_difference(expected, raw)))
         for row in np.flatnonzero(index < 0):
             if start + row < track.end or track.end + TICKS_OF_THE_END < len(track.index):
                 self.add_whole(self.stamps_ns[start + row], name, 'a message')
@@ -295,16 +295,12 @@ def field_difference(expected, recorded: bytes) -> tuple[str, str, str]:
             break
         before = place.path
         if at < place.end:
-            return place.path, *_values(place, raw, recorded)
+            texts = [_value(place, data) for data in (raw, recorded)]
+            if texts[0] == texts[1]:
+                bits = [data[place.start : place.end][::-1].hex() for data in (raw, recorded)]
+                texts = [f'{text} (0x{bit})' for text, bit in zip(texts, bits, strict=True)]
+            return place.path, *texts
     return f'padding after {before}', f'byte {raw[at]:#04x}', f'byte {recorded[at]:#04x}'
-
-
-def _values(place, raw: bytes, recorded: bytes) -> tuple[str, str]:
-    texts = [_value(place, data) for data in (raw, recorded)]
-    if texts[0] == texts[1]:
-        bits = [data[place.start : place.end][::-1].hex() for data in (raw, recorded)]
-        texts = [f'{text} (0x{bit})' for text, bit in zip(texts, bits, strict=True)]
-    return texts[0], texts[1]
 
 
 def _value(place, data: bytes) -> str:
@@ -318,11 +314,3 @@ def _value(place, data: bytes) -> str:
     if len(text) < length:
         return f'a string of {length} bytes'
     return repr(text[:-1].decode(errors='backslashreplace') if text[-1:] == b'\0' else text)
-
-
-def message_difference(
-    topic: str, codec: Codec, stamp_ns: int, values, recorded: bytes
-) -> Difference:
-    """Where a recorded message differs from the numbers that are computed."""
-    expected = deserialize_message(codec.encode(stamp_ns, values), codec.message_type)
-    return Difference(stamp_ns, topic, *field_difference(expected, recorded))

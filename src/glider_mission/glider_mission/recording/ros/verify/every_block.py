@@ -27,12 +27,12 @@ from glider_mission.recording.ros.verify.lockstep import in_lockstep
 
 
 def is_lockstep(recording: Recording, given: NodeSettings) -> bool:
-    """Whether the nodes kept step: as they were told or, if nobody says, by what it looks like."""
-    return _keeps_step(recording) if given.lockstep is None else given.lockstep
+    """Whether the nodes kept step: as they were told or, if nobody says, by what it looks like.
 
-
-def _keeps_step(recording: Recording) -> bool:
-    """Whether each output has every tick of its inputs as often as the first: once, mostly."""
+    That is: whether each output has every tick of its inputs as often as the first: once, mostly.
+    """
+    if given.lockstep is not None:
+        return given.lockstep
     odom = recording.series.get('odom')
     if odom is None or np.mean(odom.stamps_ns % TICK_NS == 0) < 0.5:
         return False
