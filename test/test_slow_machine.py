@@ -16,7 +16,7 @@ from rclpy.context import Context
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 
-from glider_base.ros.lockstep.executor import make_executor
+from glider_base.ros.lockstep.executor import TickExecutor
 from glider_base.ros.places import domain_id
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.codec import to_cdr
@@ -75,7 +75,7 @@ class Flight:
         }
         self.driver.create_subscription(JointState, 'command', self.on_command, 10)
         self.driver.create_subscription(DiagnosticArray, '/diagnostics', self.on_told, qos.EVENTS)
-        self.executor = make_executor(context=context)
+        self.executor = TickExecutor(context=context)
         for node in (*self.nodes, self.driver):
             self.executor.add_node(node)
 

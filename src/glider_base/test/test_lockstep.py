@@ -26,7 +26,7 @@ from glider_base.ros.hearing.gids import GID
 from glider_base.ros.hearing.inputs import Input
 from glider_base.ros.lockstep import clock, health, peers, step_node
 from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD, ClockNode
-from glider_base.ros.lockstep.executor import Gate, make_executor
+from glider_base.ros.lockstep.executor import Gate, TickExecutor
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.wire.codec import MessageError, to_cdr
@@ -120,7 +120,7 @@ class Graph:
         overrides = [Parameter(name, value=value) for name, value in parameters.items()]
         shared = {'context': context, 'namespace': '/glider', 'use_global_arguments': False}
         common = [p for p in overrides if p.name != 'speed']
-        self.executor = make_executor(context=context)
+        self.executor = TickExecutor(context=context)
         self.blocks = {
             name: Block(
                 name,
@@ -879,7 +879,7 @@ def test_every_message_is_told_by_whom_whatever_else_there_is_to_do(context):
         while not enough.wait(1e-4):
             publisher.publish(Header())
 
-    with make_executor(context=context) as executor:
+    with TickExecutor(context=context) as executor:
         executor.add_node(node)
         sayer = threading.Thread(target=say)
         sayer.start()
@@ -914,7 +914,7 @@ def test_timers_in_a_gate_are_called_until_they_are_destroyed_or_cancelled(conte
     clock = rclpy.clock.Clock(clock_type=rclpy.clock.ClockType.STEADY_TIME)
     ring('first', end_others)
     destroyed, cancelled = ring('destroyed'), ring('cancelled')
-    with make_executor(context=context) as executor:
+    with TickExecutor(context=context) as executor:
         executor.add_node(node)
         end = time.monotonic() + 60.0
         while min(called['first'], 2 * called['new']) < 40 and time.monotonic() < end:
@@ -928,7 +928,7 @@ def test_timers_in_a_gate_are_called_until_they_are_destroyed_or_cancelled(conte
 
 def test_who_was_woken_before_its_context_was_shut_down_does_not_wait_for_ever(context):
     """So rclpy answers SIGTERM: it wakes, then shuts down; about once in a thousand too late."""
-    with make_executor(context=context) as executor:
+    with TickExecutor(context=context) as executor:
         shut_down = threading.Timer(0.3, context.handle.shutdown)  # wakes nobody, as rclpy there
         shut_down.start()
         with contextlib.suppress(ExternalShutdownException, RuntimeError):

@@ -8,26 +8,19 @@ everything else in a tick. `TickExecutor` keeps its wait set, hands messages of 
 parameters, shutdown) to rclpy. A node waits for one input only, the one that comes last in a tick,
 and takes the others by hand when that one is there.
 
-Parts of this are not public in rclpy. Where they are missing, `make_executor` gives the executor
-of rclpy, gates are open, and `take` finds nothing because everything comes by callback: the same
-messages, more slowly.
+Parts of this are not public in rclpy; they are those of Jazzy.
 """
 
 from contextlib import ExitStack
-from functools import cache
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
 from glider_base.ros.hearing import gids
-
-try:
-    from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
-except ImportError:
-    _rclpy = None
 
 #: Kinds of entities beside subscriptions, by their collection in a node. Of these `TickExecutor`
 #: handles itself what is a timer and in a gate.
@@ -42,31 +35,16 @@ _MESSAGE_ONLY = Subscription.CallbackType.MessageOnly
 _LOOK_S = 1.0
 
 
-@cache
-def can_take() -> bool:
-    """Whether messages can be taken from a subscription without an executor."""
-    return hasattr(getattr(_rclpy, 'Subscription', None), 'take_message')
-
-
-@cache
-def can_wait() -> bool:
-    """Whether there are wait sets to be used without an executor of rclpy."""
-    kinds = ('subscription', 'guard_condition', *_RARE.values())
-    names = ('clear_entities', 'wait', 'get_ready_entities', *(f'add_{kind}' for kind in kinds))
-    return all(hasattr(getattr(_rclpy, 'WaitSet', None), name) for name in names)
-
-
 class Gate(CallbackGroup):
     """Lets the executor wait for the subscriptions in ``awaited`` only, and for all timers."""
 
     def __init__(self) -> None:
         super().__init__()
         self.awaited: set[Subscription] = set()
-        self._is_open = not can_take()
 
     def can_execute(self, entity) -> bool:
         """Whether the executor shall wait for it."""
-        return self._is_open or entity in self.awaited or isinstance(entity, Timer)
+        return entity in self.awaited or isinstance(entity, Timer)
 
     def beginning_execution(self, entity) -> bool:
         """Nothing to hold back: there is one thread."""
@@ -82,8 +60,6 @@ def take_with_info(subscription: Subscription) -> tuple | None:
     That is what a callback with two arguments gets: who published it (`gids.gid_of`), where the
     bytes are what is taken.
     """
-    if not can_take():
-        return None
     with subscription.handle:
         if subscription.raw and (taker := gids.taker()) is not None:
             return taker.take(subscription.handle.pointer)
@@ -106,15 +82,6 @@ def _call(timer: Timer) -> bool:
     except InvalidHandle:
         return False
     return is_due
-
-
-def make_executor(**kwargs) -> SingleThreadedExecutor:
-    """A `TickExecutor`, or what comes closest to it in this rclpy."""
-    if can_take() and can_wait():
-        executor = TickExecutor(**kwargs)
-        if all(hasattr(executor, name) for name in _GUARDS):
-            return executor
-    return SingleThreadedExecutor(**kwargs)
 
 
 class TickExecutor(SingleThreadedExecutor):

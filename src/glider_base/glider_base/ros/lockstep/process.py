@@ -19,7 +19,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions, get_current_signal_handlers_options
 
 from glider_base.errors import EXIT_USAGE, leave, say_fatal
-from glider_base.ros.lockstep.executor import make_executor
+from glider_base.ros.lockstep.executor import TickExecutor
 from glider_base.ros.parameters import refuse_unknown
 from glider_base.settings import ConfigurationError
 
@@ -67,7 +67,7 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
             nodes.append(node_type())
             refuse_unknown(nodes[-1])
         gc.freeze()  # compilers and libraries, which stay: else every full collection visits them
-        with make_executor() as executor:
+        with TickExecutor() as executor:
             for node in nodes:
                 executor.add_node(node)
             executor.spin()
