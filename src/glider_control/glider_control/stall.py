@@ -2,13 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stall: the vehicle slides tail first, hardly sinks or rises, and does not glide by itself.
 
-It begins where a vehicle becomes heavy before it has way with its nose not down by enough, in the
-first metres of a slow dive, or light while its nose is still down, where it turns over. The
-heavier or lighter it is made then, the faster it slides.
-
-In both its nose is sent far down or up, until it has way ahead. In a dive the pump goes to the
-middle meanwhile, or its nose would not go down; in a climb nobody takes the pump back, for what
-does not rise may be too heavy to.
+Where it begins, and how a vehicle is led out of it, is in docs/theory.md, 3.
 """
 
 import math

@@ -1,19 +1,11 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Attitude between samples, and angular rates where there is no gyro.
+"""Attitude between samples, and angular rates where there is no gyro (docs/theory.md, 4).
 
-Between two samples roll and pitch go where the moving mass takes them, whose position is known all
-the time: to the angles at which gravity has no moment,
-
-    tan phi = S_y / S_z,    tan theta = -S_x / S_z
-
-(`glider_model.onboard.moving_mass`), with a lag. Only the change of these angles since the sample
-is used: what else turns the vehicle is in the sample. The heading goes where that roll turns it,
-psi' = k sin(phi) + d, with a k for dive and climb each. From one sample to the next the heading
-has changed by k times the integral of sin(phi): that tells k, by a Kalman filter that begins with
-the vehicle's file. A rate made of two samples would be as old as half the time between them, and
-by it whoever learns how the vehicle steers learns it wrong. Only where samples are dense, that
-rate is used.
+Of the angles at which gravity has no moment only the change since the sample is used: what else
+turns the vehicle is in the sample. A rate made of two samples would be as old as half the time
+between them, and by it whoever learns how the vehicle steers learns it wrong. Only where samples
+are dense, that rate is used.
 """
 
 import math

@@ -1,17 +1,11 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is believed of the current, from the mean over each way under water.
+"""What is believed of the current, from the mean over each way under water (docs/theory.md, 4).
 
-A mean and, if that is asked for, a tide: c(t) = m + a cos(w t) + b sin(w t) on each axis. A
-Kalman filter takes in the mean over each way under water between fixes (the depth-averaged
-current, DAC). The mean wanders: over a way of T s, G s after one of T' s, its variance grows by
-q (T / 3 + G + T' / 3). How much it wanders, q, is learnt from how far the means were off so far,
-so that what is told of the errors holds (innovation-based adaptive estimation, Mehra 1970); as it
-is learnt from a few ways, w, the variance that is told is 1 + 1 / w times as large. With the tide
-left out this is persistence: the last mean holds for the next way. In a long stay at the surface
-the drift changes with the tide, as the current does, and with the wind, as it does not: which
-share of that change is found in the current is learnt. Where there is a forecast, all of this is
-about the difference between the sea and the forecast.
+A mean and, if that is asked for, a tide, by a Kalman filter. How much the mean wanders is learnt
+(innovation-based adaptive estimation, Mehra 1970). With the tide left out this is persistence: the
+last mean holds for the next way. Where there is a forecast, all of this is about the difference
+between the sea and the forecast.
 """
 
 import math

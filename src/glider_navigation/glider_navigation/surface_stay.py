@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stay at the surface: where the vehicle came up, where it is, and how it drifts, by its fixes.
 
-A Kalman filter, the same for both axes: the place goes on with the drift, and the drift wanders as
-tides and wind do. Where the vehicle came up, and how it drifted there, is kept beside the two (a
-fixed-point smoother): the first fixes tell it, and what comes hours later does not. Fixes count
-once in `FIX_EVERY_S`: the error of one is that of the next. A fix where the vehicle can hardly be
-is set aside; another one beside it, later, says that the vehicle was there after all: what was
-believed of the place is forgotten, and both count.
+A Kalman filter and a fixed-point smoother, the same for both axes (docs/theory.md, 4). A fix where
+the vehicle can hardly be is set aside; another one beside it, later, says that the vehicle was
+there after all: what was believed of the place is forgotten, and both count.
 """
 
 import math

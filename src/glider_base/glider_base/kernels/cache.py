@@ -1,14 +1,12 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where compiled kernels are kept, and when what is kept is stale.
+"""Where compiled kernels are kept, and when what is kept is stale (docs/adr/0006).
 
-numba decides whether a cached function is stale by looking at the file that defines it, not at the
-files of the functions it calls. Here a kernel is kept under a digest over the sources of all
-modules that its code can come from: its own module and what that imports, the modules of the types
-that it is compiled for, and those of the bodies that these types choose for slots. A change
-compiles again what it can reach, and nothing else. Paths are not in it: another checkout finds
-what is there. Of a file that was written after the start of the program nobody knows whether the
-program runs what is in it: nothing that can come from it is kept, or looked for.
+A kernel is kept under a digest over the sources of all modules that its code can come from: its
+own module and what that imports, the modules of the types that it is compiled for, and those of
+the bodies that these types choose for slots. Of a file that was written after the start of the
+program nobody knows whether the program runs what is in it: nothing that can come from it is kept,
+or looked for.
 """
 
 import fcntl

@@ -1,18 +1,11 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What numba does for kernels in vain, and is spared here.
+"""What numba does for kernels in vain, and is spared here (docs/adr/0009).
 
-A kernel that others call is inlined by them, so that no machine code of its own is ever run. numba
-makes it all the same. For each tuple that is bound to a name numba takes apart all numbers in it,
-to count references, though there are none in most. Of each class of tuples it asks whether it is
-any of the kinds of values that it knows, before it takes it for what it is. And what has been
-inlined is optimised as if it were new: in the loop of a flight are hundreds of numbers that
-change, and LLVM rewrites them all for each pass over loops, though what loops there are within
-have been dealt with in their kernels.
-
-All of that stands on what is not public in numba. With any other numba than the one that they were
-written for, kernels are compiled as numba does it. With any of them, Python looks for no garbage
-while something is compiled.
+That is machine code of kernels that others inline, counts of references in tuples that have none,
+and passes over loops in what has been inlined. All of it stands on what is not public in numba.
+With any other numba than the one that it was written for, kernels are compiled as numba does it.
+With any of them, Python looks for no garbage while something is compiled.
 """
 
 import gc

@@ -2,14 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run achieved: the scorecard, from the numbers on the topics alone.
 
-The same function scores a bag and a direct run. "Run" counts the whole of it, "all" leaves out the
-settling time, and "steady" counts what is after the settling time, more than 600 s away from every
-inflection on either side, and deeper than 30 m; in dives that are so shallow that this would leave
-nothing, away from inflections by `MARGIN_SHARE` of the time between two of them, and deeper than
-`STEADY_DEPTH_SHARE` of their depth. An inflection is where the desired vertical rate changes its
-sign.
-
-What is scored is the true motion, whatever the vehicle believes.
+The same function scores a bag and a direct run. What "run", "all" and "steady" count, and what an
+inflection is, is in docs/conventions.md. What is scored is the true motion, whatever the vehicle
+believes.
 """
 
 import math

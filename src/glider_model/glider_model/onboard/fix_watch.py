@@ -2,12 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether fixes contradict dead reckoning, by odometry and its covariance alone.
 
-At the first fix after a dive the believed place jumps. Over the time under water the jump is a
-velocity: that by which the mean current was not as believed. A sea that changes does that, too,
-but it shows in the drift at the surface: what lies along the change of drift since the last two
-dives, and is no longer than that, is explained by it. What is left, if it is fast and beyond what
-the covariance says, is no sea: a compass that is stuck or turned round, a declination that is
-wrong. A position that is known has a covariance of 0, and nothing of this is watched.
+What of the jump at the first fix after a dive is a sea that changes, and what is none, as with a
+compass that is stuck, is in docs/theory.md, 4. A position that is known has a covariance of 0, and
+nothing of this is watched.
 """
 
 import math

@@ -1,16 +1,11 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What rights a vehicle that is rolled, by its file.
+"""What rights a vehicle that is rolled, by its file: S_z + m_b K_MR / K_beta (docs/theory.md, 3).
 
-At rest its weight below its buoyancy does: the first moment S_z of hull and moving mass. Under way
-net heaviness pulls a rolled vehicle to its low side, net buoyancy to its high side, until the side
-force K_beta V^2 beta of the slip balances that. With dihedral the slip rolls it by K_MR V^2 beta:
-back in the dive, further over in the climb. Speed and pitch cancel out, and what is left is
-
-    S_z + m_b K_MR / K_beta
-
-A vehicle of which that is less than nothing rolls over by itself, whatever its bank. Damping makes
-it a little later, by pitch (`test_righting.py`, by steady spirals).
+At rest its weight below its buoyancy does. Under way the slip rolls it too, by its dihedral: back
+in the dive, further over in the climb. A vehicle of which that is less than nothing rolls over by
+itself, whatever its bank. Damping makes it a little later, by pitch (`test_righting.py`, by steady
+spirals).
 """
 
 from typing import NamedTuple

@@ -1,20 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Exponential Runge-Kutta of fourth order for a number that decays fast.
+"""Exponential Runge-Kutta of fourth order for a number that decays fast (docs/theory.md, 1).
 
 Cox and Matthews (2002), "Exponential time differencing for stiff systems", J. Comput. Phys. 176,
 430-455, eq. (26)-(29). For x' = -pole x + n(x, t) with a constant pole, n is what a Runge-Kutta
-method sees; the decay is solved exactly. With z = -pole h / 2, x at the beginning and n_1 ... n_4
-at the four stages:
-
-    x_2 = e^z x   + h/2 phi_1(z) n_1
-    x_3 = e^z x   + h/2 phi_1(z) n_2
-    x_4 = e^z x_2 + h/2 phi_1(z) (2 n_3 - n_1)
-    x'' = e^2z x  + h [(phi_1 - 3 phi_2 + 4 phi_3) n_1 + (2 phi_2 - 4 phi_3) (n_2 + n_3)
-                       + (4 phi_3 - phi_2) n_4](2 z)
-
-phi_k(z) = integral over s from 0 to 1 of e^((1 - s) z) s^(k-1) / (k-1)!. Where the pole is zero
-this is the classical RK4.
+method sees; the decay is solved exactly. Where the pole is zero this is the classical RK4.
 """
 
 import math

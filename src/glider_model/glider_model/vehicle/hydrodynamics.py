@@ -1,15 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Viscous forces and moments of the water on the hull, in body axes FRD.
+"""Viscous forces and moments of the water on the hull, in body axes FRD (docs/theory.md, 1).
 
 The form of Graver (2005) and Zhang et al. (2013): drag, side force and lift in wind axes, turned
 into body axes by R_BC(alpha, beta). Their polynomials in alpha hold for attached flow at a few
-degrees. Beyond that an attitude must stay physical: alpha is replaced by sin(alpha) in the drag
-(cross-flow) and by sin(alpha) cos(alpha) in lift and pitch moment, beta by v / V. At a glide's
-1.5 deg the difference is below 0.05 %, and no trigonometric function is needed. Rate damping acts
-along the wind axes on the rates about them, with which the spiral of Zhang et al. comes out; body
-rates along wind axes would drive a vehicle that moves tail first. Its axes turn by sin(alpha)
-cos(alpha)^4, 17 deg at most: it takes energy in any attitude and is slow enough to integrate.
+degrees; docs/adr/0003 says what stands for alpha and beta, so that any attitude stays physical.
 """
 
 import math

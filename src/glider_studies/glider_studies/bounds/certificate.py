@@ -2,16 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Certificates of the steering loop: one quadratic function for all vertices of a box of gains.
 
-A tick x(t + h) = x + h (F x + G v) is multi-affine in the gains, so that F and G of any gains in
-the box, also of some that change from tick to tick, lie between those of the vertices. With
-V = x' P x, along the ticks of every vertex
-
-    gain    V(t + h) - V <= h alpha (|v|^2 - V): V stays below sup |v|^2, and
-            |e| below sup |v| sqrt((P^-1)_ee)
-    region  V(t + h) <= V, and in V <= 1 each signal that saturates is below m times its limit,
-            so that its gain is above 1/m there
-
-`lmi` proposes P. What is told is computed from P alone, and `verified` by eigenvalues here.
+The inequalities, and why they hold for all gains in the box, are those of docs/theory.md, 8. `lmi`
+proposes P. What is told is computed from P alone, and `verified` by eigenvalues here.
 """
 
 import math

@@ -2,16 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop of cross-track and heading in one phase, as a linear tick with gains in a box.
 
-The state is (e, psi*, psi_s, psi_s', u_s, u_s'): the cross-track error (m), the heading that is
-left when the roll is gone, the filtered reference heading and its rate, the filtered roll and its
-rate. A vehicle that is steered by a fin has no filter of the roll. With u the angle of roll or
-fin, and the inputs d (rad/s, turn rate that the law does not know), w (m/s, error of the current)
-and delta (rad, error of the angle):
-
-    e' = U psi + w      psi = psi* + k u      psi*' = b u + d      u = u_s + delta
-
-What is nonlinear is a gain that lies between its least value and 1 as long as its signal stays
-within a limit: a saturation at L is one between 1/m and 1 while the signal is below m L.
+State, inputs and equations are those of docs/theory.md, 8. What is nonlinear is a gain that lies
+between its least value and 1 as long as its signal stays within a limit: a saturation at L is one
+between 1/m and 1 while the signal is below m L.
 """
 
 import itertools
