@@ -9,7 +9,7 @@ import numpy as np
 
 from glider_base.frames import Origin, from_geodetic
 from glider_base.kernel import kernel
-from glider_bringup.scoring.scores import largest, rms, seconds
+from glider_bringup.scoring.scores import largest, mean, rms, seconds
 from glider_mission.blocks import COLUMNS
 from glider_model.onboard.fix_watch import DIVES_M, SURFACES_M
 
@@ -156,19 +156,15 @@ class NavigationScorer:
             },
             'dac_error_mps': {'rms': rms(dac), 'worst': largest(dac)},
             'believed_cross_track_m': believed_cross_track,
-            'ellipse_95_share': _mean(within),
+            'ellipse_95_share': mean(within),
             'fixed': len(self._innovations),
-            'innovation_squared': _mean(self._innovations),
+            'innovation_squared': mean(self._innovations),
             'reports': surfacings if self._reckons else [],
         }
 
 
 def _percentile(values: np.ndarray, share: float) -> float | None:
     return float(np.percentile(values, share)) if len(values) else None
-
-
-def _mean(values: list) -> float | None:
-    return float(np.mean(values)) if values else None
 
 
 def _north_east(pair: np.ndarray) -> list[float] | None:

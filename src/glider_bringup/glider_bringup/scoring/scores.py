@@ -6,7 +6,7 @@ A new one is a line of `SCORES`: where it is in the card, and how it is made fro
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -84,6 +84,11 @@ def seconds(ticks: int) -> float:
 def rms(values: np.ndarray) -> float | None:
     """Root of the mean square; None of nothing."""
     return float(math.sqrt(np.mean(values * values))) if len(values) else None
+
+
+def mean(values: Sequence[float]) -> float | None:
+    """Mean; None of nothing."""
+    return float(np.mean(values)) if len(values) else None
 
 
 def largest(values: np.ndarray) -> float | None:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_base.frames import quaternion_from_euler, rotate_to_ned
+from glider_base.frames import body_rates, quaternion_from_euler, rotate_to_ned
 from glider_base.settings import ConfigurationError
 from glider_base.signals import Joints, Water
 from glider_model.ocean.density import DensityParams
@@ -122,12 +122,7 @@ def _residual(z: np.ndarray, share: float, glide: _Glide) -> np.ndarray:
     """Acceleration (6), which a steady glide does not have; a share of the way to its turn."""
     u, v, w, theta, phi, rate, x_p = _unpack(z, glide)
     q = quaternion_from_euler(phi, theta, 0.0)
-    p, q_rate, r = (
-        -rate * math.sin(theta),
-        rate * math.cos(theta) * math.sin(phi),
-        rate * math.cos(theta) * math.cos(phi),
-    )
-    motion = Motion(0.0, 0.0, 100.0, *q, u, v, w, p, q_rate, r)
+    motion = Motion(0.0, 0.0, 100.0, *q, u, v, w, *body_rates(phi, theta, 0.0, 0.0, rate))
     mu = share * glide.mu
     inertia = make_inertia(x_p, mu, glide.vehicle)
     joints = Joints(glide.net_heaviness, x_p, mu, share * glide.delta)

@@ -11,7 +11,7 @@ import numpy as np
 from glider_base.frames import within_180
 from glider_bringup.scoring.one_hertz import Record
 from glider_bringup.scoring.score import windows
-from glider_bringup.scoring.scores import largest, rms
+from glider_bringup.scoring.scores import largest, mean, rms
 from glider_guidance.los import crab_heading
 from glider_mission.planned import horizontal_speed
 from glider_mission.scenario import Scenario
@@ -20,10 +20,6 @@ from glider_mission.scenario import Scenario
 _SAMPLE_S = 1.0
 #: A leg of a survey is looked at this long after its corner (s).
 CORNER_S = 600.0
-
-
-def _mean(values: np.ndarray) -> float | None:
-    return float(np.mean(values)) if len(values) else None
 
 
 def _windows(record: Record, scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
@@ -45,10 +41,10 @@ def measure_attitude(record: Record, scenario: Scenario) -> dict[str, Any]:
             'max_steady': largest(record.roll[steady]),
         },
         'trim': {
-            'pitch_dive_deg': _mean(record.pitch[down]),
-            'pitch_climb_deg': _mean(record.pitch[up]),
-            'pitch_mass_dive_mm': _mean(pitch_mass[down]),
-            'pitch_mass_climb_mm': _mean(pitch_mass[up]),
+            'pitch_dive_deg': mean(record.pitch[down]),
+            'pitch_climb_deg': mean(record.pitch[up]),
+            'pitch_mass_dive_mm': mean(pitch_mass[down]),
+            'pitch_mass_climb_mm': mean(pitch_mass[up]),
         },
     }
 
@@ -111,7 +107,7 @@ def measure_crab(record: Record, scenario: Scenario) -> dict[str, Any]:
     speed, north, east = horizontal_speed(scenario), *scenario.constant_current()
     best, _, _ = crab_heading(scenario.path.course_rad(), speed, north, east)
     error = within_180(record.heading[steady] - math.degrees(best))
-    return {'crab_error_deg': _mean(np.abs(error))}
+    return {'crab_error_deg': mean(np.abs(error))}
 
 
 #: Measurements by their name in the file of experiments.
