@@ -131,65 +131,42 @@ class Vehicle(_Steered):
     )
 
     @pydantic.model_validator(mode='after')
-    def _has_one_surface(self):
+    def _could_be_built(self):
         there = [name for name in SURFACES if getattr(self, name) is not None]
         if len(there) > 1:
             raise ValueError(f'{", ".join(there)}: a vehicle has one of them at most')
-        return self
-
-    @pydantic.model_validator(mode='after')
-    def _crushes_below_its_rating(self):
-        if self.rated_depth and self.crush_depth_m <= self.rated_depth.value:
-            raise ValueError(
-                f'crush_depth: {self.crush_depth_m:g} m (allowed: > {self.rated_depth.value:g} m, '
-                'its rated_depth)'
-            )
-        return self
-
-    @pydantic.model_validator(mode='after')
-    def _pumps_at_its_rated_depth(self):
-        fall = _value(self.buoyancy_engine.rate_per_m)
-        if self.rated_depth and fall * self.rated_depth.value > 1.0 - LEAST_PUMP_SHARE:
-            most = (1.0 - LEAST_PUMP_SHARE) / self.rated_depth_m
-            raise ValueError(
-                f'buoyancy_engine.rate_per_m: {fall:g} 1/m '
-                f'(allowed: <= {most:.3g} 1/m, which leaves 5 % of the rate at its rated_depth)'
-            )
-        return self
-
-    @pydantic.model_validator(mode='after')
-    def _has_what_shrinks(self):
+        if self.rated_depth:
+            rated_m, fall = self.rated_depth_m, _value(self.buoyancy_engine.rate_per_m)
+            if self.crush_depth_m <= rated_m:
+                raise ValueError(
+                    f'crush_depth: {self.crush_depth_m:g} m (allowed: > {rated_m:g} m, its '
+                    'rated_depth)'
+                )
+            if fall * rated_m > 1.0 - LEAST_PUMP_SHARE:
+                most = (1.0 - LEAST_PUMP_SHARE) / rated_m
+                raise ValueError(
+                    f'buoyancy_engine.rate_per_m: {fall:g} 1/m '
+                    f'(allowed: <= {most:.3g} 1/m, which leaves 5 % of the rate at its '
+                    'rated_depth)'
+                )
         for name in ('compressibility', 'thermal_expansion'):
             if _value(getattr(self, name)) and not self.volume:
                 raise ValueError(f'{name}: of no volume (allowed: beside volume)')
-        return self
-
-    @pydantic.model_validator(mode='after')
-    def _floats_in_some_water(self):
+        x = self.params()
         if self.volume:
-            neutral = self.params().m / self.volume.value
+            neutral = x.m / self.volume.value
             if not WATER[0] <= neutral <= WATER[1]:
                 raise ValueError(
                     f'rigid_body, moving_mass, volume: neutral in water of {neutral:.4g} kg/m^3 '
                     f'(allowed: {WATER[0]:g} to {WATER[1]:g} kg/m^3)'
                 )
-        return self
-
-    @pydantic.model_validator(mode='after')
-    def _hangs_upright(self):
-        x = self.params()
         low = (x.s_z + x.m_p * x.R_p) / x.m
         if low <= 0.0:
             raise ValueError(
                 f'rigid_body, moving_mass: top-heavy, its centre of mass is at z = {low:.3g} m '
                 '(allowed: > 0 m, below the centre of buoyancy)'
             )
-        return self
-
-    @pydantic.model_validator(mode='after')
-    def _mass_is_positive(self):
-        fault = mass_fault(self.params())
-        if fault:
+        if fault := mass_fault(x):
             raise ValueError(f'rigid_body, moving_mass, added_mass: {fault}')
         return self
 
@@ -247,6 +224,8 @@ class Vehicle(_Steered):
         body, mass, added = self.rigid_body, self.moving_mass, self.added_mass
         hydro, pump = self.hydrodynamics, self.buoyancy_engine
         coefficients = 'K_D0 K_D K_L0 K_L K_beta K_MR K_p K_M0 K_M K_q K_MY K_r'.split()
+        lacking = 'volume compressibility thermal_expansion reference_temperature'.split()
+        lacking += ['pump_x', 'drop_weight']
         surface = getattr(self, self.steers_by) if self.steers_by else None
         return VehicleParams(
             m=body.hull_mass.value + mass.mass.value,
@@ -275,16 +254,11 @@ class Vehicle(_Steered):
             mu_max=math.radians(mass.rotation.value),
             mu_rate=math.radians(mass.rotation_rate.value),
             ballast=0.0,
-            volume=_value(self.volume),
-            compressibility=_value(self.compressibility),
-            thermal_expansion=_value(self.thermal_expansion),
-            reference_temperature=_value(self.reference_temperature),
+            **{name: _value(getattr(self, name)) for name in lacking},
             shallowest_glide=math.radians(
                 self.shallowest_glide.value if self.shallowest_glide else SHALLOWEST_GLIDE_DEG
             ),
             slowest_glide=self.slowest_glide.value if self.slowest_glide else SLOWEST_GLIDE_MPS,
-            pump_x=_value(self.pump_x),
-            drop_weight=_value(self.drop_weight),
             surface=surface.params() if surface else NoSurface(),
             delta_max=math.radians(surface.range.value) if surface else 0.0,
             delta_rate=math.radians(surface.rate.value) if surface else 0.0,
