@@ -268,21 +268,16 @@ class Vehicle(_Steered):
     def _errors(self, surface: SurfaceSettings | None) -> ActuatorErrors:
         """How its actuators err."""
         pump, mass = self.buoyancy_engine, self.moving_mass
-        return ActuatorErrors(
-            Joints(
-                _value(pump.dead_band),
-                _value(mass.dead_band),
-                math.radians(_value(mass.rotation_dead_band)),
-                math.radians(_value(surface.dead_band)) if surface else 0.0,
-            ),
-            Joints(
-                _value(pump.noise),
-                _value(mass.noise),
-                math.radians(_value(mass.rotation_noise)),
-                math.radians(_value(surface.noise)) if surface else 0.0,
-            ),
-            _value(pump.rate_per_m),
-        )
+
+        def joints(name: str) -> Joints:
+            return Joints(
+                _value(getattr(pump, name)),
+                _value(getattr(mass, name)),
+                math.radians(_value(getattr(mass, f'rotation_{name}'))),
+                math.radians(_value(getattr(surface, name))) if surface else 0.0,
+            )
+
+        return ActuatorErrors(joints('dead_band'), joints('noise'), _value(pump.rate_per_m))
 
 
 def _named(names: str, numbers) -> dict[str, float]:
