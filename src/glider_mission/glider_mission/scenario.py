@@ -179,10 +179,7 @@ class Scenario(Settings):
     def _path_in_metres(cls, path: Any, info: pydantic.ValidationInfo) -> Any:
         return in_metres(path, info.data.get('origin'))
 
-    @pydantic.field_validator('profile', mode='before')
-    @classmethod
-    def _profile_of_mafiles(cls, profile: Any) -> Any:
-        return with_mafiles(profile)
+    _profile_of_mafiles = pydantic.field_validator('profile', mode='before')(with_mafiles)
 
     @pydantic.field_validator('orders', mode='before')
     @classmethod

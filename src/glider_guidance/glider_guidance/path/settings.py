@@ -189,11 +189,51 @@ class _ThroughWaypoints(_PathSettings):
     @pydantic.field_validator('waypoints')
     @classmethod
     def _check_waypoints(cls, waypoints: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-        return _check_waypoints(waypoints)
+        """Refuse waypoints that make no path, and give each one a depth."""
+        points = [_point(point, f'waypoint {i}') for i, point in enumerate(waypoints)]
+        if len({len(point) for point in waypoints}) > 1:
+            raise ValueError(
+                'all waypoints need a depth, or none (allowed: 2 or 3 numbers in each)'
+            )
+        for i, (one, after) in enumerate(pairwise(points)):
+            length = math.dist(one, after)
+            if length < MIN_LEG_M:
+                raise ValueError(
+                    f'waypoints {i} and {i + 1} coincide: {list(one)!r} and {list(after)!r} are '
+                    f'{length:.3f} m apart (allowed: >= {MIN_LEG_M} m{_hint(points)})'
+                )
+        length = sum(math.dist(one, after) for one, after in pairwise(points))
+        if length < MIN_WAY_M:
+            raise ValueError(
+                f'the whole path is {length:.3f} m long (allowed: >= {MIN_WAY_M} m{_hint(points)})'
+            )
+        return points
 
     @pydantic.model_validator(mode='after')
     def _check_slopes(self):
-        _check_slopes(self.params())
+        """Refuse a path so steep somewhere that it has no course, or one that turns on a cusp."""
+        params = self.params()
+        x = np.diff(params.knots)[:, None] * np.linspace(0.0, 1.0, 65)
+        c = params.coefficients[:, :, :, None]
+        dn, de, dd = np.moveaxis(
+            c[:, :, 1] + x[:, None] * (2.0 * c[:, :, 2] + 3.0 * x[:, None] * c[:, :, 3]), 1, 0
+        )
+        slopes_deg = np.degrees(np.arctan2(dd, np.hypot(dn, de)))
+        steepest, sample = np.unravel_index(np.argmax(np.abs(slopes_deg)), slopes_deg.shape)
+        slope_deg = slopes_deg[steepest, sample]
+        if abs(slope_deg) > MAX_SLOPE_DEG:
+            raise ValueError(
+                f'the path between waypoints {steepest} and {steepest + 1} has a slope of '
+                f'{slope_deg:.1f} deg (allowed: >= {-MAX_SLOPE_DEG} and <= {MAX_SLOPE_DEG}; a '
+                'vertical path has no course)'
+            )
+        rates = np.sqrt(dn**2 + de**2 + dd**2)
+        slowest, sample = np.unravel_index(np.argmin(rates), rates.shape)
+        if rates[slowest, sample] < MIN_RATE:
+            raise ValueError(
+                f'the spline turns on the spot near waypoint {slowest + round(sample / 64)}: '
+                'lead it around in a curve'
+            )
         return self
 
 
@@ -320,54 +360,9 @@ PathSettings = Annotated[
 ]
 
 
-def _check_waypoints(waypoints: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-    """Refuse waypoints that make no path, and give each one a depth."""
-    points = [_point(point, f'waypoint {i}') for i, point in enumerate(waypoints)]
-    if len({len(point) for point in waypoints}) > 1:
-        raise ValueError('all waypoints need a depth, or none (allowed: 2 or 3 numbers in each)')
-    for i, (one, after) in enumerate(pairwise(points)):
-        length = math.dist(one, after)
-        if length < MIN_LEG_M:
-            raise ValueError(
-                f'waypoints {i} and {i + 1} coincide: {list(one)!r} and {list(after)!r} are '
-                f'{length:.3f} m apart (allowed: >= {MIN_LEG_M} m{_hint(points)})'
-            )
-    length = sum(math.dist(one, after) for one, after in pairwise(points))
-    if length < MIN_WAY_M:
-        raise ValueError(
-            f'the whole path is {length:.3f} m long (allowed: >= {MIN_WAY_M} m{_hint(points)})'
-        )
-    return points
-
-
 def _hint(points: list[tuple[float, float, float]]) -> str:
     """What to say of waypoints so close together that could be degrees."""
     north, east = (max(abs(point[k]) for point in points) for k in range(2))
     if north > 90.0 or east > 180.0 or max(north, east) < MIN_LEG_M:
         return ''
     return '; metres north and east of the start, not latitude and longitude'
-
-
-def _check_slopes(params: PathParams) -> None:
-    """Refuse a path that is somewhere so steep that it has no course, or that turns on a cusp."""
-    x = np.diff(params.knots)[:, None] * np.linspace(0.0, 1.0, 65)
-    c = params.coefficients[:, :, :, None]
-    dn, de, dd = np.moveaxis(
-        c[:, :, 1] + x[:, None] * (2.0 * c[:, :, 2] + 3.0 * x[:, None] * c[:, :, 3]), 1, 0
-    )
-    slopes_deg = np.degrees(np.arctan2(dd, np.hypot(dn, de)))
-    steepest, sample = np.unravel_index(np.argmax(np.abs(slopes_deg)), slopes_deg.shape)
-    slope_deg = slopes_deg[steepest, sample]
-    if abs(slope_deg) > MAX_SLOPE_DEG:
-        raise ValueError(
-            f'the path between waypoints {steepest} and {steepest + 1} has a slope of '
-            f'{slope_deg:.1f} deg (allowed: >= {-MAX_SLOPE_DEG} and <= {MAX_SLOPE_DEG}; a '
-            'vertical path has no course)'
-        )
-    rates = np.sqrt(dn**2 + de**2 + dd**2)
-    slowest, sample = np.unravel_index(np.argmin(rates), rates.shape)
-    if rates[slowest, sample] < MIN_RATE:
-        raise ValueError(
-            f'the spline turns on the spot near waypoint {slowest + round(sample / 64)}: '
-            'lead it around in a curve'
-        )

@@ -111,7 +111,7 @@ class _Flow(_Component):
     def _has_flow(self) -> bool:
         return bool(self._given('speed_kn', 'speed_mps', 'angle_deg', 'direction_deg'))
 
-    def _require_flow(self) -> None:
+    def _require_flow(self):
         for one, other in (('speed_kn', 'speed_mps'), ('angle_deg', 'direction_deg')):
             given = self._given(one, other)
             if len(given) != 1:
@@ -119,6 +119,7 @@ class _Flow(_Component):
                 raise ValueError(
                     f'give exactly one of {one} and {other}, found {found or "neither"}'
                 )
+        return self
 
     def resolved(self, course_rad: float):
         """Copy with the speed in m/s and the direction clockwise from north."""
@@ -148,10 +149,7 @@ class _Flow(_Component):
 class _FlowComponent(_Flow):
     """A component that must have a speed and a direction."""
 
-    @pydantic.model_validator(mode='after')
-    def _check_flow(self):
-        self._require_flow()
-        return self
+    _check_flow = pydantic.model_validator(mode='after')(_Flow._require_flow)
 
 
 class ConstantCurrent(_FlowComponent):
@@ -378,9 +376,7 @@ class SumOfCurrents(_Flow):
 
     @pydantic.model_validator(mode='after')
     def _check_constant(self):
-        if self._has_flow():
-            self._require_flow()
-        return self
+        return self._require_flow() if self._has_flow() else self
 
     def resolved(self, course_rad: float, mission: Mission | None = None) -> 'SumOfCurrents':
         """Copy that needs no path: every angle absolute, every speed in m/s.
