@@ -223,9 +223,10 @@ def test_a_helix_is_not_planned_along_a_chord_nor_a_path_that_is_followed_down_a
         plan(load_scenario('spline'))
 
 
-def row_at(place, stage, believed=(0.0, 0.0)):
-    """Log row of a vehicle at a place."""
+def row_at(place, stage, believed=(0.0, 0.0), target=None):
+    """Log row of a vehicle at a place, with guidance's target there or elsewhere."""
     row = np.zeros(ROW)
+    row[COLUMNS['reference']][:2] = (place if target is None else target)[::-1]
     row[COLUMNS['odom'].start], row[COLUMNS['odom'].start + 1] = place[1], place[0]
     row[COLUMNS['stage']] = stage
     row[COLUMNS['believed_current']][:2] = believed[::-1]
@@ -250,31 +251,38 @@ def test_a_pilot_plans_at_the_start_and_at_each_surfacing_once(hard):
     np.testing.assert_allclose(given[5].path.waypoints[0][:2], place)
 
 
-def test_a_waypoint_that_was_passed_on_a_bend_under_way_is_not_gone_back_to(hard):
-    """3 km off the line between the surfacings; one that was passed so far away is."""
+def test_a_waypoint_that_guidance_came_by_is_not_gone_back_to(hard):
+    """However far the vehicle is carried past it, as on straight legs; one that it did not is."""
     scenario, *_ = hard
     start, first, second = waypoints_of(scenario)[:3]
-    for off_m, is_passed in ((500.0, True), (3000.0, False)):
+    for before_m, is_passed in ((500.0, True), (3000.0, False)):
         pilot = Pilot(scenario)
         pilot.order(0, None)
-        bend = first + (0.0, off_m)
-        way = [(start, 1), (0.5 * (start + bend), 1), (bend, 1), (bend + (-3e3, 3e3), 1)]
-        way += [(bend + (-6e3, 0.0), 5)] * 8
-        told = [pilot.order(LOOK_TICKS * k, row_at(*one)) for k, one in enumerate(way, 1)]
+        come = first - before_m * (first - start) / math.dist(first, start)
+        beyond = first + (-6e3, 3e3)
+        rows = [row_at(0.5 * (start + first), 1), row_at(first + (0.0, 4e3), 1, target=come)]
+        rows += [row_at(beyond, 5)] * 8
+        told = [pilot.order(LOOK_TICKS * k, row) for k, row in enumerate(rows, 1)]
         (order,) = filter(None, told)
         nearest = min(np.hypot(*(np.array(one[:2]) - first)) for one in order.path.waypoints)
         assert (nearest > 1.0) == is_passed
 
 
 def test_a_pilot_who_shall_not_replan_or_is_nearly_there_says_nothing(hard):
+    """Nearly there is who has the last point alone to come to, and a straight leg leads there."""
     scenario, *_ = hard
-    end = waypoints_of(scenario)[-1]
-    for replan, place in (('never', (0.0, 0.0)), ('surfacing', end + 3000.0)):
+    *passed, end = waypoints_of(scenario)[1:]
+    for replan, targets, place, speaks in (
+        ('never', passed, (0.0, 0.0), False),
+        ('surfacing', passed, end - 3000.0, False),
+        ('surfacing', passed, end + 3000.0, True),
+        ('surfacing', passed[:-1], end - 3000.0, True),
+    ):
         pilot = Pilot(load_scenario('eddies_hard', {'guidance.replan': replan}))
         pilot.order(0, None)
-        stages = [1, *(8 * [5])]
-        told = [pilot.order(LOOK_TICKS * k, row_at(place, s)) for k, s in enumerate(stages, 1)]
-        assert told == [None] * len(stages)
+        rows = [row_at(target, 1) for target in targets] + 8 * [row_at(place, 5)]
+        told = [pilot.order(LOOK_TICKS * k, row) for k, row in enumerate(rows, 1)]
+        assert any(told) == speaks
 
 
 def test_straight_legs_are_flown_where_a_plan_gains_little(monkeypatch):

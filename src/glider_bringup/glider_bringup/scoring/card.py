@@ -131,7 +131,10 @@ _Energy = _part('wh wh_per_dive endurance_days range_km', by=_part('pump hotel m
 
 #: What became of a mission that ends with its path.
 _Arrival = _part(
-    't_s missed_m left_m eta_s overrun_s', arrived=bool, place_latlon_deg=_Pair | None
+    't_s missed_m left_m eta_s overrun_s',
+    arrived=bool,
+    place_latlon_deg=_Pair | None,
+    waypoints_m=(list[float], []),
 )
 _Bottom = _part('t_s least_height_m', touched=bool)
 _Surfacing = _part(

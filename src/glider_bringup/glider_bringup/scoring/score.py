@@ -78,6 +78,8 @@ _GUARD, _SATURATION, _INFEASIBLE = (
     COLUMNS[name] for name in ('guard', 'saturation', 'infeasible')
 )
 _TARGET = slice(_FIRST_REFERENCE, _FIRST_REFERENCE + 2)
+#: Rows from one second to the next.
+_EACH_S = round(1.0 / TICK_S)
 
 
 @kernel
@@ -131,6 +133,9 @@ class Scorer:
         self._hull = vehicle.rated_depth_m, vehicle.crush_depth_m
         self._has_weight = bool(vehicle.drop_weight)
         self._bottom = None if bottom is NO_BOTTOM else BottomWatch(bottom)
+        #: waypoints before the last, north and east (m), and how near it came to each (m)
+        self._waypoints = getattr(scenario.path, 'waypoints', [])[1:-1]
+        self._nearest_m = np.full(len(self._waypoints), math.inf)
         self._truth = TrueMotion()
         self._navigation = NavigationScorer(scenario.origin.params(), reckons)
         self._faults = FaultTimes(scenario.faults)
@@ -157,6 +162,10 @@ class Scorer:
         self._blocks.append(_series_of(log, given))
         if self._bottom:
             self._bottom.add(*np.ascontiguousarray(poses_from_wire(log[:, _ODOM])[:, :3].T))
+        easts, norths = log[::_EACH_S, _FIRST_ODOM : _FIRST_ODOM + 2].T
+        for k, (north, east, _) in enumerate(self._waypoints):
+            near_m = np.hypot(norths - north, easts - east).min()
+            self._nearest_m[k] = min(self._nearest_m[k], near_m)
         if self._first is None:
             self._first = self._last = log[0].copy()
         for row in jumps(log[:, _TARGET], self._last[_TARGET]).tolist():
@@ -316,6 +325,8 @@ class Scorer:
             is_at_end=self._end is not None,
             rules=rules,
         )
+        if arrival:
+            arrival['waypoints_m'] = self._nearest_m.tolist()
         end_m = arrival['missed_m'] if arrival and self._end else None
         return {'end_of_path_m': end_m, 'arrival': arrival}
 

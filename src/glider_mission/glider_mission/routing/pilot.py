@@ -18,6 +18,7 @@ from glider_guidance.orders import is_surfaced
 from glider_guidance.path.settings import WaypointPath
 from glider_mission.blocks import COLUMNS
 from glider_mission.routing.forecast_chart import forecast_of, observed
+from glider_mission.routing.fronts import line_arrival
 from glider_mission.routing.plan import (
     as_dived,
     crossing,
@@ -33,8 +34,9 @@ from glider_mission.scenario import Scenario
 LOOK_TICKS = 600
 #: At the surface a place is known after this time, or half of the stay if that is shorter (s).
 _LISTEN_S = 180.0
-#: A waypoint is passed from this near on (m); from this near on to the last one nothing changes.
-_PASSED_M, _LAST_M = 2000.0, 8000.0
+#: A waypoint is passed from this near on (m); so is one this near (m) to which no straight leg
+#: leads: the vehicle is carried past it. Where one leads to the last, nothing changes any more.
+_PASSED_M, _NEAR_M = 2000.0, 8000.0
 #: A planned route has to be faster than straight legs by this share, in the middle of the errors
 #: that the forecast may have.
 LEAST_GAIN = 0.03
@@ -43,7 +45,8 @@ _HORIZON_S = 60.0 * 86_400.0
 #: Corners of a route are farther apart than this (m).
 _APART_M = 200.0
 
-_ODOM, _BELIEVED, _STAGE = COLUMNS['odom'].start, COLUMNS['believed_current'], COLUMNS['stage']
+_ODOM, _TARGET = COLUMNS['odom'].start, COLUMNS['reference'].start
+_BELIEVED, _STAGE = COLUMNS['believed_current'], COLUMNS['stage']
 
 
 class Pilot:
@@ -80,8 +83,8 @@ class Pilot:
             return self._told(t_s, self._waypoints[0])
         if not self._replans:
             return None
-        place = np.array([row[_ODOM + 1], row[_ODOM]])
-        self._pass(place)
+        place, target = (np.array([row[at + 1], row[at]]) for at in (_ODOM, _TARGET))
+        self._pass(target)
         if not is_surfaced(int(row[_STAGE])):
             self._up_s, self._was_ordered = 0.0, False
             return None
@@ -90,14 +93,15 @@ class Pilot:
             return None
         self._was_ordered = True
         self._look(t_s, place, row[_BELIEVED])
-        if math.dist(place, self._waypoints[-1]) < _LAST_M:
-            return None
         return self._told(t_s, place)
 
-    def _pass(self, place: np.ndarray) -> None:
-        """Note the waypoints that are passed, where the vehicle believes it is on its way."""
+    def _pass(self, target: np.ndarray) -> None:
+        """Note the waypoints that are passed, by the point of the route that guidance came to.
+
+        As on straight legs, one that the vehicle is carried past is not gone back to.
+        """
         goals = self._waypoints[self._next : -1]
-        if len(goals) and math.dist(place, goals[0]) < _PASSED_M:
+        if len(goals) and math.dist(target, goals[0]) < _PASSED_M:
             self._next += 1
 
     def _look(self, t_s: float, place: np.ndarray, believed: np.ndarray) -> None:
@@ -116,6 +120,13 @@ class Pilot:
         seen = np.array(self._seen).reshape(-1, 5)
         forecast, error_km = self._forecast, self._scenario.forecast.error_km
         chart = forecast.sailed(observed(forecast.chart, seen, forecast.error_mps, error_km))
+        goal = self._waypoints[self._next]
+        if math.dist(place, goal) < _NEAR_M:
+            leads = math.isfinite(line_arrival(chart, t_s, *place, *goal, self._speed))
+            is_last = self._next == len(self._waypoints) - 1
+            if leads and is_last:
+                return None
+            self._next += not (leads or is_last)
         left = np.vstack((place, self._waypoints[self._next :]))
         end_s = t_s + _HORIZON_S
         coast = chart, forecast.land, self._bottom

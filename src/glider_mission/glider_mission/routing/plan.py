@@ -22,7 +22,9 @@ from glider_model.onboard.glide_polar import glide_net_heaviness
 from glider_model.vehicle.file import load_vehicle
 
 #: A route is straightened where that moves it by less than this (m).
-_STRAIGHT_M = 1000.0
+_STRAIGHT_M = 500.0
+#: Who is so near to where its path is entered is there (m).
+_THERE_M = 1000.0
 #: Whether a leg leads over land is looked at so often along it (m).
 _LOOK_M = 20.0
 #: How deep it is there is looked at so often (m).
@@ -291,7 +293,7 @@ def waypoints_of(scenario: Scenario) -> np.ndarray:
     start = initial.north_m, initial.east_m, initial.depth_m
     s = path_entry(*start, scenario.profile.mode != 'path', path)
     ways = np.array([path_point(at, path)[:2] for at in (s, *path.knots[path.knots > s])])
-    is_there = len(ways) > 1 and np.hypot(*(ways[0] - start[:2])) < _STRAIGHT_M
+    is_there = len(ways) > 1 and np.hypot(*(ways[0] - start[:2])) < _THERE_M
     return np.vstack((start[:2], ways[int(is_there) :]))
 
 
