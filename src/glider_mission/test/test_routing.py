@@ -202,6 +202,15 @@ def test_straight_legs_do_for_gentle_eddies_and_not_for_strong_ones():
     assert 100.0 < gentle.wh < 500.0
 
 
+def test_a_route_that_was_found_can_be_sailed_as_it_was_straightened(tmp_path):
+    """In a sea where the current is as fast as the vehicle, and no corner may be cut by 1 km."""
+    write_sea(EddyingSea(seed=3009, rms_mps=0.3), tmp_path / 'sea.nc')
+    sea = {'orders': [], 'forecast.late_h': 0.0, 'current.field.file': str(tmp_path / 'sea.nc')}
+    made = plan(load_scenario('eddies_10d', sea))
+    assert made.reachable and made.straight_s == math.inf
+    assert made.arrival_s(50.0) < 1.02 * made.route.passed_s[-1]
+
+
 def test_errors_of_the_forecast_widen_what_a_plan_says():
     sure = plan(load_scenario('eddies_10d'))
     unsure = plan(load_scenario('eddies_10d', {'forecast.error_mps': 0.05}))
