@@ -277,6 +277,23 @@ def test_a_waypoint_that_guidance_came_by_is_not_gone_back_to(hard):
         assert (nearest > 1.0) == is_passed
 
 
+def test_a_waypoint_that_the_current_leads_past_is_not_gone_round_an_eddy_for(tmp_path):
+    """By a sea in which the vehicle comes up 3 km from its first waypoint, and is carried past."""
+    write_sea(EddyingSea(seed=3016, rms_mps=0.42), tmp_path / 'sea.nc')
+    sea = {'orders': [], 'current.field.file': str(tmp_path / 'sea.nc')}
+    sea |= {'guidance.route': 'planned', 'guidance.replan': 'surfacing'}
+    scenario = load_scenario('eddies_10d', sea)
+    first = waypoints_of(scenario)[1]
+    for place, is_passed in (((26_700.0, 24_400.0), True), ((25_000.0, 25_000.0), False)):
+        pilot, look = Pilot(scenario), 13 * 60
+        pilot.order(0, None)
+        rows = [row_at(place, 1), *(8 * [row_at(place, 5)])]
+        told = [pilot.order(LOOK_TICKS * (look + k), row) for k, row in enumerate(rows)]
+        (order,) = filter(None, told)
+        nearest = min(math.dist(one[:2], first) for one in order.path.waypoints)
+        assert (nearest > 2000.0) == is_passed
+
+
 def test_a_pilot_who_shall_not_replan_or_is_nearly_there_says_nothing(hard):
     """Nearly there is who has the last point alone to come to, and a straight leg leads there."""
     scenario, *_ = hard

@@ -34,9 +34,10 @@ from glider_mission.scenario import Scenario
 LOOK_TICKS = 600
 #: At the surface a place is known after this time, or half of the stay if that is shorter (s).
 _LISTEN_S = 180.0
-#: A waypoint is passed from this near on (m); so is one this near (m) to which no straight leg
-#: leads: the vehicle is carried past it. Where one leads to the last, nothing changes any more.
-_PASSED_M, _NEAR_M = 2000.0, 8000.0
+#: A waypoint is passed from this near on (m). The vehicle is carried past one this near (m) to
+#: which no straight leg leads, nor any route within so long (s). From this near on to the last,
+#: nothing changes while a straight leg leads there.
+_PASSED_M, _NEAR_M, _ROUND_S = 2000.0, 8000.0, 86_400.0
 #: A planned route has to be faster than straight legs by this share, in the middle of the errors
 #: that the forecast may have.
 LEAST_GAIN = 0.03
@@ -115,21 +116,23 @@ class Pilot:
         if way and math.isfinite(east) and math.isfinite(north) and (east or north):
             self._seen.append((*way, north, east))
 
+    def _comes_round(self, coast: tuple, left: np.ndarray, t_s: float) -> bool:
+        """Whether a route of no more than `_ROUND_S` leads to the first of what is left."""
+        return route_round(*coast, left[:2], t_s, self._speed, t_s + _ROUND_S).arrives
+
     def _told(self, t_s: float, place: np.ndarray) -> Order | None:
         """Order to follow the best route from a place; None where it follows that already."""
         seen = np.array(self._seen).reshape(-1, 5)
         forecast, error_km = self._forecast, self._scenario.forecast.error_km
         chart = forecast.sailed(observed(forecast.chart, seen, forecast.error_mps, error_km))
-        goal = self._waypoints[self._next]
-        if math.dist(place, goal) < _NEAR_M:
-            leads = math.isfinite(line_arrival(chart, t_s, *place, *goal, self._speed))
-            is_last = self._next == len(self._waypoints) - 1
+        left, end_s = np.vstack((place, self._waypoints[self._next :])), t_s + _HORIZON_S
+        coast, is_last = (chart, forecast.land, self._bottom), len(left) == 2
+        if math.dist(*left[:2]) < _NEAR_M:
+            leads = math.isfinite(line_arrival(chart, t_s, *left[:2].ravel(), self._speed))
             if leads and is_last:
                 return None
-            self._next += not (leads or is_last)
-        left = np.vstack((place, self._waypoints[self._next :]))
-        end_s = t_s + _HORIZON_S
-        coast = chart, forecast.land, self._bottom
+            if not (leads or is_last or self._comes_round(coast, left, t_s)):
+                self._next, left = self._next + 1, np.delete(left, 1, axis=0)
         route = route_round(*coast, left, t_s, self._speed, end_s)
         is_land = crossing(*coast, left) is not None
         seas = [chart._replace(current=chart.current + error) for error in self._errors]
