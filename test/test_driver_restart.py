@@ -28,7 +28,7 @@ from sensor_msgs.msg import JointState, NavSatFix
 from glider_base.ros.lockstep import health
 from glider_base.ros.places import domain_id
 from glider_base.ros.wire import qos
-from glider_base.ros.wire.topics import topic_of
+from glider_base.ros.wire.topics import PLANT, topic_of
 from glider_base.wiring import JOINTS
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import AUTOPILOT, RECORDER, node_commands, node_environment
@@ -97,6 +97,7 @@ class Heard:
         self.node.create_subscription(JointState, 'command', self.on_command, 100)
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self.on_told, qos.EVENTS)
         self.node.create_subscription(DiagnosticArray, 'lockstep', self.on_report, qos.EVENTS)
+        self.end = self.node.create_publisher(DiagnosticArray, 'lockstep', qos.EVENTS)
 
     def on_command(self, command) -> None:
         pump = dict(zip(command.name, command.position, strict=True))['buoyancy_engine']
@@ -108,6 +109,11 @@ class Heard:
 
     def on_report(self, array) -> None:
         self.ready |= {r.node for r in health.reports_in(array) if r.phase == health.READY}
+
+    def other_run_ends(self) -> None:
+        """Say what a simulated run of somebody else says, beside the vehicle."""
+        report = health.Report(PLANT, health.FINISHED, health.COMPLETE, process='another')
+        self.end.publish(health.report_array(report))
 
     def takers(self) -> set[str]:
         """Nodes that said that a new driver takes the place of the old one."""
@@ -166,6 +172,7 @@ def flight(tmp_path_factory):
             heard.until(lambda: heard.ready >= nodes)
             first = start([*driver, 'reliable', *space])
             heard.until(lambda: heard.commands and heard.commands[-1][1] > 0.2 and recorded_s())
+            heard.other_run_ends()
             recorder.send_signal(signal.SIGSTOP)  # it has no time, and asks for all of it again
             heard.listen(STOPPED_S)
             recorder.send_signal(signal.SIGCONT)

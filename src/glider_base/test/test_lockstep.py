@@ -242,9 +242,12 @@ def test_node_that_falls_silent_is_named(make_graph, culprit, topic):
     assert str(stop).startswith(f'{culprit} did not publish {topic} for t = 2.0 s')
 
 
-@pytest.mark.parametrize('is_rival', [True, False])
-def test_a_plant_of_a_second_glider_does_not_end_the_run(make_graph, context, is_rival):
-    graph = make_graph(last_tick=10**9)
+@pytest.mark.parametrize(('is_rival', 'lockstep'), [(True, True), (False, True), (True, False)])
+def test_a_plant_of_a_second_glider_does_not_end_the_run(
+    make_graph, context, is_rival, lockstep
+):
+    """Nor, free-running, a simulated one beside the vehicle, that nobody has heard of before."""
+    graph = make_graph(last_tick=10**9, lockstep=lockstep)
     assert graph.spin(lambda: graph.plant.tick > 10) is None
     topic = TOPICS['lockstep']
     rival = rclpy.create_node('rival', namespace='/glider', context=context)

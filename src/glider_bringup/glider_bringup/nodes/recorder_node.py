@@ -209,10 +209,12 @@ class RecorderNode(TickNode):
 
     def on_report(self, report: health.Report) -> None:
         """Learn the last tick from the plant, and keep what it says about the end."""
+        name = f'{self.get_namespace().rstrip("/")}/{topics.PLANT}'
+        if not self.ticks.lockstep and name not in {item.owner.name for item in self.inputs}:
+            return  # that of somebody else: the vehicle is another
         if report.node == topics.PLANT and report.phase in (health.FINISHED, health.FAILED):
             self.over_since_s = time.monotonic()
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
-            name = f'{self.get_namespace().rstrip("/")}/{report.node}'
             named = report._replace(node=name, process='')
             self.end = report.stamp_ns, to_cdr(health.report_array(named))
 

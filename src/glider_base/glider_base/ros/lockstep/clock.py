@@ -91,7 +91,8 @@ class ClockNode(TickNode):
         self._startup_watch = self.wall_timer(0.25, self._on_startup_watch)
 
     def _peers(self) -> list[str]:
-        names = [wired.node for wired in WIRING if wired.node != self.get_name()]
+        every = WIRING if self.ticks.lockstep else ()  # free-running nobody leaves with it
+        names = [wired.node for wired in every if wired.node != self.get_name()]
         return [*names, topics.RECORDER] if self.ticks.record else names
 
     def unmatched(self) -> list[str]:

@@ -209,7 +209,12 @@ class TickNode(Node):
             self.on_report(report)
 
     def on_report(self, report: Report) -> None:
-        """React to the report of a node: say goodbye when the plant ends the run."""
+        """React to the report of a node: say goodbye when the plant ends the run.
+
+        Free-running there is no end: a vehicle flies on, whatever simulated one is beside it.
+        """
+        if not self.ticks.lockstep:
+            return
         if report.node == topics.PLANT and report.phase == health.FAILED:
             raise Stop(0)
         if report.node == topics.PLANT and report.phase == health.FINISHED:
