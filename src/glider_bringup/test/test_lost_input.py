@@ -12,12 +12,14 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_NS
+from glider_base.wiring import at_rest
 from glider_control.nodes.control_node import ControlNode
 from glider_guard.nodes.guard_node import GuardNode
 from glider_guard.rows import DEPTH_WRONG, LOST, ORDERED
@@ -118,6 +120,46 @@ def test_lost_input_surfaces_the_vehicle_for_good(flight):
     assert set(vehicle.commands[before:]) == {SAFE}
     flight.until(lambda: vehicle.said('surface: ordered to the surface'))
     assert flight.guard.state.reported & ORDERED
+
+
+def test_nothing_is_cleared_while_nobody_knows_how_deep_the_vehicle_is(context, monkeypatch):
+    """Before the first message, and without one: it would dive on when the line is back."""
+    overrides = [Parameter('lockstep', value=False)]
+    guard, now_s = GuardNode(context=context, parameter_overrides=overrides), 100.0
+    monkeypatch.setattr(guard, 'now_s', lambda: now_s)
+
+    def cleared() -> str:
+        return guard.on_clear(Trigger.Request(), Trigger.Response()).message
+
+    try:
+        assert 'depth not known' in cleared()
+        for item in guard.inputs:
+            item.accept_newest(
+                item.topic.codec.encode(10**9, at_rest(item.topic.name)), now_s, 1.0
+            )
+        guard._on_cycle()
+        assert cleared() == 'cleared'
+        for _ in range(130):
+            now_s += 0.1
+            guard._on_cycle()
+        assert 'depth not known without demand' in cleared()
+        assert guard.condition().message.endswith('; surfacing for good')
+    finally:
+        guard.close()
+        guard.destroy_node()
+
+
+def test_control_that_is_configured_again_counts_anew_what_it_refuses(context):
+    node, told = ControlNode(context=context), []
+    try:
+        node.refused = 3  # of which it has told
+        node.on_configure(None)
+        node.publish_event = told.append
+        node.tell(10**9, (0,))
+        assert len(told) == 1  # and not that none was refused
+    finally:
+        node.close()
+        node.destroy_node()
 
 
 @pytest.mark.parametrize('heard', [True, False])

@@ -15,8 +15,12 @@ class ControlNode(BlockNode):
 
     def __init__(self, **kwargs) -> None:
         super().__init__(CONTROL, **kwargs)
-        self.refused = 0
         self.start_up()
+
+    def forget(self) -> None:
+        """Know nothing, as at the start."""
+        super().forget()
+        self.refused = 0  #: samples of which it has told
 
     def tell(self, stamp_ns: int, flags: tuple[int, ...]) -> None:
         """Put a change of saturation on /diagnostics."""

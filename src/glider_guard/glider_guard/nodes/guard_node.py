@@ -21,8 +21,6 @@ class GuardNode(BlockNode):
     The service clear_guard forgets what has latched, at the surface only.
     """
 
-    when_stale = 'commanding the safe state until then'
-
     def __init__(self, **kwargs) -> None:
         super().__init__(GUARD, **kwargs)
         self.create_service(Trigger, 'clear_guard', self.on_clear)
@@ -34,17 +32,24 @@ class GuardNode(BlockNode):
         self.stale_ticks, self.ascent = 0, INITIAL_ASCENT
 
     def on_clear(self, request, response):
-        """Serve ``clear_guard``."""
+        """Serve ``clear_guard``; while an input is stale nobody knows how deep the vehicle is."""
         depth = self.state.depths.depth
-        response.success = bool(depth < SURFACE_M)
-        response.message = (
-            'cleared'
-            if response.success
-            else (f'{depth:.1f} m deep: only at the surface, above {SURFACE_M:g} m, is it cleared')
-        )
+        is_known = self.flags is not None and not self._stale
+        response.success = bool(is_known and depth < SURFACE_M)
         if response.success:
             self.clear()
+            response.message = 'cleared'
+        else:
+            missing = f'depth not known without {", ".join(self._stale) or "input"}'
+            why = f'{depth:.1f} m deep' if is_known else missing
+            response.message = f'{why}: only at the surface, above {SURFACE_M:g} m, is it cleared'
         return response
+
+    @property
+    def when_stale(self) -> str:
+        """What the node does while an input is stale."""
+        is_lost = health.SURFACE in self.orders
+        return 'surfacing for good' if is_lost else 'commanding the safe state until then'
 
     @property
     def sample_period_s(self) -> float:
