@@ -162,6 +162,7 @@ class Vehicle:
     def __init__(self, scenario, folder) -> None:
         state, self.params = mission_of(scenario)
         self.plant, _, _, self.guidance, self.control, _ = state
+        self.begin = self.control
         self.bag = BagWriter(folder, 'flight')
         self.order = 0
         self.told, self.saturation = None, (0, 0)
@@ -351,3 +352,20 @@ def test_hole_in_such_a_recording_is_named_beside_the_difference(glider, free_fl
         first_s, last_s = (float(word) for word in re.findall(r't = (\S+) s', note))
         assert 0.9 < last_s - first_s < 1.3
         assert first_s < blocks[name]['first']['t_s'] < last_s + 0.1
+
+
+def test_node_that_was_configured_again_is_named_beside_the_difference(glider, free_flight):
+    """It is back at once: no topic is silent."""
+
+    def spoil(vehicle, tick: int) -> None:
+        if tick != 300:
+            return
+        vehicle.control, vehicle.passing['control'] = vehicle.begin, Passing(1.0)
+        told = f'{NAMESPACE}/control_node', health.OK, health.CONFIGURED
+        vehicle.put('/diagnostics', to_cdr(health.status_array(vehicle.odom[0], *told, {})))
+
+    code, blocks = verified(glider, free_flight(spoil))
+    assert (code, blocks['guidance']['result']) == (1, 'identical')
+    first, notes = blocks['control']['first'], blocks['control']['notes']
+    (note,) = (said for said in notes if said.startswith('control_node was configured at'))
+    assert abs(float(re.search(r't = (\S+) s', note)[1]) - first['t_s']) < 0.3

@@ -243,9 +243,7 @@ def test_node_that_falls_silent_is_named(make_graph, culprit, topic):
 
 
 @pytest.mark.parametrize(('is_rival', 'lockstep'), [(True, True), (False, True), (True, False)])
-def test_a_plant_of_a_second_glider_does_not_end_the_run(
-    make_graph, context, is_rival, lockstep
-):
+def test_a_plant_of_a_second_glider_does_not_end_the_run(make_graph, context, is_rival, lockstep):
     """Nor, free-running, a simulated one beside the vehicle, that nobody has heard of before."""
     graph = make_graph(last_tick=10**9, lockstep=lockstep)
     assert graph.spin(lambda: graph.plant.tick > 10) is None

@@ -91,6 +91,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start from nothing, but for an order to come up."""
         self.forget()
+        self.event(self._newest_ns(), health.OK, health.CONFIGURED)
         if self.orders.keys() & {health.ABORT, health.SURFACE}:
             self.state = self.block.surface(self.state)
         return TransitionCallbackReturn.SUCCESS

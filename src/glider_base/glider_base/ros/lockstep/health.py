@@ -33,6 +33,9 @@ COMPLETE = 'the run is complete'
 #: state, inputs and parameters, and these change the last of them, or the state.
 ABORT, PARAMETERS_SET, SURFACE, CLEAR = 'abort', 'parameters set', 'surface', 'clear'
 
+#: What a managed node tells when it is configured.
+CONFIGURED = 'configured: it knows nothing of before'
+
 _SECOND_NS = 1_000_000_000
 #: The stamp of a message with a header, after the 4 bytes that say how it is encoded.
 _STAMP, _STAMP_AT = struct.Struct('<iI'), 4

@@ -7,6 +7,7 @@ from copy import copy
 
 import numpy as np
 
+from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.health import seconds
 from glider_base.ros.lockstep.step_node import Passing
 from glider_base.signals import TICK_S
@@ -84,6 +85,13 @@ def free_running(
             for begin_ns, end_ns in _silences(
                 series[name].stamps_ns, at_ns, _MISSED_S.get(name, max_age_s)
             )
+        ]
+        check.notes += [
+            f'{wired.node} was configured at {seconds(event.stamp_ns)}, and began anew: if it had '
+            'learnt anything before, this is why'
+            for event in recording.events
+            if (event.node, event.message) == (recording.node(wired.node), health.CONFIGURED)
+            and stamps_ns[0] <= event.stamp_ns <= at_ns
         ]
     elif check.ticks:
         check.finish_events()
