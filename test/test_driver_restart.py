@@ -19,6 +19,7 @@ import pytest
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from mcap.reader import make_reader
+from nav_msgs.msg import Path as PathMessage
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
@@ -97,6 +98,7 @@ class Heard:
         self.node.create_subscription(JointState, 'command', self.on_command, 100)
         self.node.create_subscription(DiagnosticArray, '/diagnostics', self.on_told, qos.EVENTS)
         self.node.create_subscription(DiagnosticArray, 'lockstep', self.on_report, qos.EVENTS)
+        self.path = self.node.create_publisher(PathMessage, 'path', qos.LATCHED)
         self.end = self.node.create_publisher(DiagnosticArray, 'lockstep', qos.EVENTS)
 
     def on_command(self, command) -> None:
@@ -110,8 +112,9 @@ class Heard:
     def on_report(self, array) -> None:
         self.ready |= {r.node for r in health.reports_in(array) if r.phase == health.READY}
 
-    def other_run_ends(self) -> None:
-        """Say what a simulated run of somebody else says, beside the vehicle."""
+    def disturb(self) -> None:
+        """Say what a simulated run of somebody else says, and bytes that are no path."""
+        self.path.publish(b'\0\1\0\0')
         report = health.Report(PLANT, health.FINISHED, health.COMPLETE, process='another')
         self.end.publish(health.report_array(report))
 
@@ -172,7 +175,7 @@ def flight(tmp_path_factory):
             heard.until(lambda: heard.ready >= nodes)
             first = start([*driver, 'reliable', *space])
             heard.until(lambda: heard.commands and heard.commands[-1][1] > 0.2 and recorded_s())
-            heard.other_run_ends()
+            heard.disturb()
             recorder.send_signal(signal.SIGSTOP)  # it has no time, and asks for all of it again
             heard.listen(STOPPED_S)
             recorder.send_signal(signal.SIGCONT)

@@ -178,6 +178,8 @@ class RecorderNode(TickNode):
 
     def on_path(self, raw: bytes) -> None:
         """Keep a path, under the stamp it carries; once in step, only one that was ordered."""
+        if len(raw) < 12:
+            return  # bytes that are no message
         sec, nanosec = struct.unpack_from('<iI', raw, 4)
         stamp_ns = sec * 1_000_000_000 + nanosec
         if stamp_ns == 0 and self.begun and not self.is_replayed():
