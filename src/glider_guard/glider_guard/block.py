@@ -36,8 +36,18 @@ def guard_tick(state, t_s, inputs, params, dt):
     )
     missed_s = t_s - state.t_s - dt
     if state.tick > 0 and missed_s > dt:
-        seen = state.witness  # before a silence, or a pause: as old as that
-        state = replace(state, witness=replace(seen, own_s=seen.own_s + missed_s))
+        # before a silence, or a pause: as old as that, and what was gone meanwhile is no lag
+        seen, depths = state.witness, state.depths
+        fallen = heard.odometry.p_d - state.taken.gate.odometry.p_d
+        if not abs(fallen) <= params.depth.jump_m:  # that is set anew
+            fallen = 0.0
+        depths = replace(
+            depths,
+            mean=depths.mean + fallen,
+            lag_m=depths.lag_m + fallen,
+            astray_m=depths.astray_m + fallen,
+        )
+        state = replace(state, witness=replace(seen, own_s=seen.own_s + missed_s), depths=depths)
     state, out = guard_step(state, heard, params, dt)
     state = replace(state, t_s=t_s)
     command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)

@@ -10,17 +10,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glider_base.frames import quaternion_from_euler, rotate_to_body
+from glider_base.frames import odometry_to_wire, quaternion_from_euler, rotate_to_body
 from glider_base.kernel import kernel, replace
 from glider_base.settings import ConfigurationError
 from glider_base.signals import SURFACE_TARGET, TICK_S, Battery, Health, Joints, Odometry
-from glider_base.wiring import NO_ECHO
+from glider_base.wiring import NO_ECHO, WHEN_SILENT
 from glider_guard import rows
 from glider_guard.actuators import INITIAL_FOLLOWERS, follow
 from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
 from glider_guard.block import GUARD, guard_surface, say
 from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
 from glider_guard.settings import GuardSettings
+from glider_model.ocean.density import pressure_at
 from glider_model.onboard.glide_polar import glide_vertical_rate
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
@@ -352,6 +353,26 @@ def test_a_depth_that_jumps_under_water_is_wrong(jump_m, sensor, told):
     vehicle.go(10.0)
     vehicle.depth += jump_m
     assert bool(vehicle.go(10.0) & rows.DEPTH_WRONG) == told
+
+
+def test_what_is_gone_while_the_guard_is_paused_is_no_lag():
+    """A managed node that is deactivated now and then, and a depth that stands still meanwhile."""
+    for sinks, told in ((True, 0), (False, rows.FROZEN)):
+        settings = GuardSettings()
+        state, params, t_s, depth_m = settings.initial_state(), settings.params(), 0.0, 100.0
+        for second in range(150):
+            t_s += 29.0 * (second % 3 == 0)  # and 3 s of it is seen
+            depth_m += 0.15 * 29.0 * (second % 3 == 0)
+            for _ in range(10):
+                t_s, depth_m = t_s + TICK_S, depth_m + 0.15 * TICK_S
+                seen = seen_at(Where(depth_m if sinks else 100.0, t_s, DIVES), 0.15, -0.3)
+                odom = (*odometry_to_wire(seen), *(4 * (0.0,)))
+                said = {'reference': (0.0, 0.0, -1000.0, *odom[3:13]), 'odom': odom}
+                said['pressure'] = (pressure_at(-odom[2]),)
+                said |= {'demand': tuple(DIVES), 'joint_states': tuple(DIVES), **WHEN_SILENT}
+                inputs = tuple(said[name] for name in GUARD.wired.inputs)
+                state, _, flags = GUARD.tick(state, t_s, inputs, params, TICK_S)
+        assert flags[0] & rows.FROZEN == told
 
 
 def test_a_depth_that_jumps_at_the_surface_has_an_offset():
