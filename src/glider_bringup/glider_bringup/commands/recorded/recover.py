@@ -5,6 +5,7 @@
 import json
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import typer
@@ -41,6 +42,7 @@ def _ticks(run: Path) -> dict[str, Any]:
     from glider_bringup.scoring.card import read_score
     from glider_mission.planned import planned_ticks
     from glider_mission.recording.mcap_reader import Bag
+    from glider_mission.recording.ros.node_settings import read_settings
     from glider_mission.recording.ros.recorded_log import read_back
     from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS
     from glider_mission.run_folder import scenario_of
@@ -49,6 +51,9 @@ def _ticks(run: Path) -> dict[str, Any]:
     found['lacking'] = {}
     bag = Bag(run)
     try:
+        with TemporaryDirectory() as scratch:
+            if read_settings(bag, run, None, Path(scratch)).lockstep is False:
+                raise ConfigurationError(f'{run}: its nodes were free-running')
         with scenario_of(run, bag.attachments) as flown:
             log = read_back(bag, flown.scenario.vehicle, [])
             found['ticks_planned'] = planned_ticks(flown.scenario)
