@@ -244,7 +244,7 @@ class Vehicle:
             self.repeat('control')
             return
         told, told_ns = self.saturation
-        if out.saturation != told and stamp_ns - told_ns >= 1_000_000_000:
+        if out.saturation != told and not 0 <= stamp_ns - told_ns < 1_000_000_000:
             self.saturation = (out.saturation, stamp_ns)
             self.put(
                 '/diagnostics',
@@ -369,3 +369,12 @@ def test_node_that_was_configured_again_is_named_beside_the_difference(glider, f
     first, notes = blocks['control']['first'], blocks['control']['notes']
     (note,) = (said for said in notes if said.startswith('control_node was configured at'))
     assert abs(float(re.search(r't = (\S+) s', note)[1]) - first['t_s']) < 0.3
+
+
+def test_order_after_the_clock_was_set_back_is_followed_where_it_was(glider, free_flight):
+    def spoil(vehicle, tick: int) -> None:
+        if tick == 300:
+            vehicle.measure = lambda stamp_ns: Vehicle.measure(vehicle, stamp_ns - 10**11)
+
+    code, blocks = verified(glider, free_flight(spoil))
+    assert code == 0, blocks['control']['first']

@@ -98,8 +98,16 @@ class Check:
         self.paths = [(block.settings.path, 0)] if block.block.wired == wiring.GUIDANCE else []
         node = recording.node(block.block.wired.node)
         asked = [e for e in recording.events if e.node == node and e.message in ORDERS]
-        #: given in flight, in the order in which it followed them
-        self._orders = sorted(asked, key=lambda event: event.stamp_ns)
+        if np.all(np.diff(stamps_ns) >= 0):  # else a clock was set back: as they came
+            asked.sort(key=lambda event: event.stamp_ns)
+        #: given in flight, each with the step before which it was followed
+        self._orders, step = [], 0
+        for order in asked:
+            left_ns = stamps_ns[step:]
+            at = [*np.flatnonzero(left_ns == order.stamp_ns)[:1]]
+            at += [*np.flatnonzero(left_ns >= order.stamp_ns)[:1], len(left_ns)]
+            step += int(at[0])
+            self._orders.append((step, order))
 
     def add(self, difference: Difference) -> None:
         """Keep a difference."""
@@ -128,14 +136,12 @@ class Check:
 
     def cuts(self, count: int) -> list[int]:
         """Steps before which an order changes the block."""
-        at = {int(np.searchsorted(self.stamps_ns, order.stamp_ns)) for order in self._orders}
-        return sorted(i for i in at if i < count)
+        return sorted({step for step, _ in self._orders if step < count})
 
     def follow_orders(self, step: int) -> None:
         """Do what was asked of the block before a step."""
-        stamp_ns = self.stamps_ns[step]
-        while self._orders and self._orders[0].stamp_ns <= stamp_ns:
-            order = self._orders.pop(0)
+        while self._orders and self._orders[0][0] <= step:
+            _, order = self._orders.pop(0)
             if order.message in (ABORT, SURFACE):
                 self.block.surface()
                 continue

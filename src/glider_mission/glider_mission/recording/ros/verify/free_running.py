@@ -17,6 +17,8 @@ from glider_mission.recording.ros.verify.check import Check, Track, Verdict
 
 #: A step has the newest message of an input, or one that is so many older.
 _OLDER = range(4)
+#: Behind a clock that was set back a step is looked for so many messages ahead.
+_AHEAD = 1024
 #: An input goes on by one message from step to step, or by one of these.
 _ADVANCES = (1, 0, 2)
 #: What comes in every tick is missed after so long (s); answers, which may come late, later.
@@ -64,9 +66,9 @@ def free_running(
     while start < len(stamps_ns):
         choices = {}
         for name in block.inputs:
-            newest_ns = np.maximum.accumulate(series[name].stamps_ns)  # a clock may be set back
-            behind = int(np.searchsorted(newest_ns, stamps_ns[start], 'right'))
-            choices[name] = _places(behind - 1, last and last[name])
+            before = last and last[name]
+            newest = _newest(series[name].stamps_ns, stamps_ns[start], before or 0)
+            choices[name] = _places(newest, before)
         check.follow_orders(start)
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])
         rows, good = _closest(check, start, end, _options(choices), outputs)
@@ -103,6 +105,16 @@ def _silences(stamps_ns: np.ndarray, at_ns: int, least_s: float) -> list[tuple[i
     after = int(np.searchsorted(stamps_ns, at_ns))
     around = map(int, stamps_ns[max(0, after - 1) : after + 2])
     return [(a, b) for a, b in itertools.pairwise(around) if b - a > 1e9 * least_s]
+
+
+def _newest(stamps_ns: np.ndarray, stamp_ns: int, before: int) -> int:
+    """Newest of an input's messages at a stamp, int64[n]; the step before had that ``before``."""
+    newest_ns = np.maximum.accumulate(stamps_ns)
+    newest = int(np.searchsorted(newest_ns, stamp_ns, 'right')) - 1
+    if newest < before or newest_ns[newest] != stamps_ns[newest]:  # the clock was set back
+        same = np.flatnonzero(stamps_ns[before : before + _AHEAD] == stamp_ns)
+        newest = before + int(same[0]) if len(same) else newest
+    return newest
 
 
 def _places(newest: int, last: int | None) -> list[int]:
