@@ -212,7 +212,8 @@ class RecorderNode(TickNode):
     def on_report(self, report: health.Report) -> None:
         """Learn the last tick from the plant, and keep what it says about the end."""
         name = f'{self.get_namespace().rstrip("/")}/{topics.PLANT}'
-        if not self.ticks.lockstep and name not in {item.owner.name for item in self.inputs}:
+        heard = {item.owner.name for item in self.inputs if item.stamp_ns >= 0}
+        if not self.ticks.lockstep and not heard & {name, ''}:  # '': nobody knows whom
             return  # that of somebody else: the vehicle is another
         if report.node == topics.PLANT and report.phase in (health.FINISHED, health.FAILED):
             self.over_since_s = time.monotonic()
