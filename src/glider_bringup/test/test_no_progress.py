@@ -57,6 +57,12 @@ def test_who_gets_on_hears_nothing():
     assert len(surfacings(run)) >= 2 and not run.score['no_progress']['events']
 
 
+def test_time_for_which_it_is_held_is_none_without_progress():
+    orders = [{'at_s': 150.0, 'hold': True}, {'at_s': 30_000.0, 'resume': True}]
+    run = fly('hold', 31_000.0, orders=orders, **{'current.speed_mps': 0.0})
+    assert len(surfacings(run)) >= 3 and not run.score['no_progress']['events']
+
+
 def test_telling_changes_no_bit():
     told, quiet = (
         fly('tell', **{'guidance.no_progress_surfacings': count}).to_xarray() for count in (2, 0)

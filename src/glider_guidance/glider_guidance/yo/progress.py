@@ -26,8 +26,10 @@ def watch_progress(progress, tick, s, stage, profile):
     ``s`` (m) is the parameter of the virtual target, which never goes back along a path; ``stage``
     is the one before the tick, ``profile`` the `ProfileState` after it.
     """
-    if profile.stage != WAITING_ON_SURFACE or stage == profile.stage or profile.aborted:
+    if profile.stage != WAITING_ON_SURFACE or profile.aborted:
         return progress
+    if stage == profile.stage:  # while it waits or is held there is none to be made
+        return Progress(progress.s, progress.tick + 1, progress.surfacings)
     if s - progress.s > LEAST_PROGRESS * TICK_S * (tick - progress.tick):
         return Progress(s, tick, 0)
     return replace(progress, surfacings=progress.surfacings + 1)
