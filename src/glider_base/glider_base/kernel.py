@@ -103,8 +103,11 @@ def _replaced(values, **changes):
     if unknown := set(changes) - set(made._fields):
         raise TypeError(f'{made.__name__} has no field {", ".join(sorted(unknown))}')
     fields = (name if name in changes else f'values.{name}' for name in made._fields)
+    # numba tells the calls of a kernel apart by the types of their arguments alone: one that is
+    # never given has the names
+    arguments = ', '.join(['values', *changes, f'which={" ".join(changes)!r}'])
     names = {'made': made}
-    exec(f'def replaced(values, {", ".join(changes)}): return made({", ".join(fields)})', names)
+    exec(f'def replaced({arguments}): return made({", ".join(fields)})', names)
     return names['replaced']
 
 

@@ -41,6 +41,19 @@ def test_compiled_it_is_what_namedtuple_itself_does():
     assert numba.njit(change)(BEFORE, 4, 0.3) == after
 
 
+def test_two_in_one_kernel_that_change_other_fields_of_the_same_type_stay_two():
+    class Pair(NamedTuple):
+        a: int
+        b: int
+
+    def either(pair, which):
+        return replace(pair, a=5) if which else replace(pair, b=5)
+
+    compiled = numba.njit(either)
+    assert compiled(Pair(1, 2), True) == Pair(5, 2)
+    assert compiled(Pair(1, 2), False) == Pair(1, 5)
+
+
 def test_a_field_that_is_not_there_is_refused():
     def wrong(values):
         return replace(values, depth=1.0)
