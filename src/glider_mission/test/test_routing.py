@@ -140,7 +140,7 @@ def test_nothing_sails_over_land():
 
 def test_a_straightened_route_stays_near_and_keeps_its_ends():
     way = np.array([[0.0, 0.0], [100.0, 3000.0], [-100.0, 6000.0], [9000.0, 9000.0]])
-    found = np.array(straightened(way))
+    found = np.array(straightened(way, 1000.0))
     np.testing.assert_array_equal(found, way[[0, 2, 3]])
 
 
@@ -208,7 +208,7 @@ def test_a_route_that_was_found_can_be_sailed_as_it_was_straightened(tmp_path):
     sea = {'orders': [], 'forecast.late_h': 0.0, 'current.field.file': str(tmp_path / 'sea.nc')}
     made = plan(load_scenario('eddies_10d', sea))
     assert made.reachable and made.straight_s == math.inf
-    assert made.arrival_s(50.0) < 1.02 * made.route.passed_s[-1]
+    assert made.arrival_s(50.0) < 1.03 * made.route.passed_s[-1]
 
 
 def test_errors_of_the_forecast_widen_what_a_plan_says():

@@ -21,8 +21,9 @@ from glider_model.onboard.command_filter import Filtered, filter_angle
 from glider_model.onboard.glide_polar import glide_net_heaviness
 from glider_model.vehicle.file import load_vehicle
 
-#: A route is straightened where that moves it by less than this (m).
-_STRAIGHT_M = 500.0
+#: A route is straightened where that moves it by less than the first of these (m) by which it can
+#: be sailed.
+_STRAIGHT_M = 1000.0, 500.0, 250.0, 0.0
 #: Who is so near to where its path is entered is there (m).
 _THERE_M = 1000.0
 #: Whether a leg leads over land is looked at so often along it (m).
@@ -187,7 +188,12 @@ def route_through(
         while point >= 0:
             points.append((chart.norths[point // columns], chart.easts[point % columns]))
             point = before[point]
-        corners += straightened(np.array([place, *points[::-1], goal]))[1:]
+        way, late_s = np.array([place, *points[::-1], goal]), 2.0 * goal_s - t_s
+        for within_m in _STRAIGHT_M:
+            leg = straightened(way, within_m)
+            if math.isfinite(sailed_s(chart, np.array(leg), t_s, speed, late_s)):
+                break
+        corners += leg[1:]
         passed.append(goal_s)
         ends.append(len(corners) - 1)
         t_s = goal_s
@@ -267,8 +273,8 @@ def route_round(
         land[point] = True
 
 
-def straightened(points: np.ndarray) -> list[np.ndarray]:
-    """Fewer corners, none farther than `_STRAIGHT_M` off (Douglas and Peucker 1973)."""
+def straightened(points: np.ndarray, within_m: float) -> list[np.ndarray]:
+    """Fewer corners, none left out that is farther off (m; Douglas and Peucker 1973)."""
     first, last = points[0], points[-1]
     if len(points) < 3:
         return [first, last]
@@ -277,9 +283,10 @@ def straightened(points: np.ndarray) -> list[np.ndarray]:
     away = points - first
     off = np.abs(away[:, 0] * chord[1] - away[:, 1] * chord[0]) / length
     farthest = int(off.argmax())
-    if off[farthest] < _STRAIGHT_M:
+    if off[farthest] <= within_m:
         return [first, last]
-    return straightened(points[: farthest + 1])[:-1] + straightened(points[farthest:])
+    before, after = points[: farthest + 1], points[farthest:]
+    return straightened(before, within_m)[:-1] + straightened(after, within_m)
 
 
 def sailed_s(chart: Chart, route: np.ndarray, t_s: float, speed: float, end_s: float) -> float:
