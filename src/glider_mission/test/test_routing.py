@@ -277,6 +277,20 @@ def test_a_waypoint_that_guidance_came_by_is_not_gone_back_to(hard):
         assert (nearest > 1.0) == is_passed
 
 
+def test_legs_that_are_shorter_than_a_waypoint_is_passed_by_are_all_flown(hard):
+    """Of waypoints a kilometre apart none is passed by who has just begun."""
+    corners = [(1000.0, 0.0), (1000.0, 1000.0)]
+    ways = [(0.0, 0.0), *corners, *map(tuple, waypoints_of(hard[0])[1:].tolist())]
+    path = {'kind': 'waypoints', 'waypoints': ways}
+    pilot = Pilot(load_scenario('eddies_hard', {'path': path}))
+    pilot.order(0, None)
+    rows = [*(8 * [row_at((300.0, 0.0), 1)]), *(8 * [row_at((300.0, 0.0), 5)])]
+    told = [pilot.order(LOOK_TICKS * k, row) for k, row in enumerate(rows, 1)]
+    (order,) = filter(None, told)
+    on_route = [one[:2] for one in order.path.waypoints]
+    assert all(min(math.dist(one, corner) for one in on_route) < 1.0 for corner in corners)
+
+
 def test_a_waypoint_that_the_current_leads_past_is_not_gone_round_an_eddy_for(tmp_path):
     """By a sea in which the vehicle comes up 3 km from its first waypoint, and is carried past."""
     write_sea(EddyingSea(seed=3016, rms_mps=0.42), tmp_path / 'sea.nc')

@@ -34,9 +34,9 @@ from glider_mission.scenario import Scenario
 LOOK_TICKS = 600
 #: At the surface a place is known after this time, or half of the stay if that is shorter (s).
 _LISTEN_S = 180.0
-#: A waypoint is passed from this near on (m). The vehicle is carried past one this near (m) to
-#: which no straight leg leads, nor any route within so long (s). From this near on to the last,
-#: nothing changes while a straight leg leads there.
+#: A waypoint is passed from this near on (m), or from the middle of a shorter leg. The vehicle is
+#: carried past one this near (m) to which no straight leg leads, nor any route within so long (s).
+#: From this near on to the last, nothing changes while a straight leg leads there.
 _PASSED_M, _NEAR_M, _ROUND_S = 2000.0, 8000.0, 86_400.0
 #: A planned route has to be faster than straight legs by this share, in the middle of the errors
 #: that the forecast may have.
@@ -101,8 +101,9 @@ class Pilot:
 
         As on straight legs, one that the vehicle is carried past is not gone back to.
         """
-        goals = self._waypoints[self._next : -1]
-        if len(goals) and math.dist(target, goals[0]) < _PASSED_M:
+        before, goal = self._waypoints[self._next - 1 : self._next + 1]
+        near_m = min(_PASSED_M, 0.5 * math.dist(before, goal))
+        if self._next < len(self._waypoints) - 1 and math.dist(target, goal) < near_m:
             self._next += 1
 
     def _look(self, t_s: float, place: np.ndarray, believed: np.ndarray) -> None:
