@@ -19,9 +19,6 @@ from glider_mission.changes import fields_text
 from glider_mission.chart import place_text
 from glider_model.ocean.current_settings import KNOT_MPS
 
-#: A waypoint is passed far off from here on (m).
-_FAR_M = 2000.0
-
 
 def show(value: float | None, unit: str, digits: int = 2) -> str:
     """Number with its unit; a dash if there is none."""
@@ -125,10 +122,7 @@ def arrival_text(card: dict) -> str:
     if part['t_s'] is not None:
         missed = show(part['missed_m'], 'm', 1)
         text = f'came up {missed} from its last point after {span(part["t_s"])}{where}'
-        text += '' if part['arrived'] else ', too far off to have arrived'
-        near_m = enumerate(part.get('waypoints_m', []), 2)  # the first is where the path begins
-        far = [f'; waypoint {k} passed {way(off)} off' for k, off in near_m if off > _FAR_M]
-        return text + ''.join(far)
+        return text + ('' if part['arrived'] else ', too far off to have arrived')
     text = f'did not arrive in {span(card["sim_time_s"])}: {way(part["left_m"])} left{where}'
     more_s = None if part['eta_s'] is None else part['eta_s'] - card['sim_time_s']
     return text + ('' if more_s is None else f'; at its pace {span(more_s)} more')
