@@ -134,7 +134,7 @@ _Arrival = _part(
     't_s missed_m left_m eta_s overrun_s',
     arrived=bool,
     place_latlon_deg=_Pair | None,
-    waypoints_m=(list[float], []),
+    waypoints_m=(list[_Figure], []),
 )
 _Bottom = _part('t_s least_height_m', touched=bool)
 _Surfacing = _part(

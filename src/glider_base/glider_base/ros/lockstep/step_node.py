@@ -67,7 +67,6 @@ class StepNode(TickNode):
         self._stood = (0.0, time.monotonic())  #: time of the cycles, and since when it is that (s)
         self._told = (0, 0, 0)
         self._tell_s = -float('inf')
-        StepNode.forget(self)
 
     def forget(self) -> None:
         """Know nothing, as at the start: the next cycle is a step, whatever its stamp."""
