@@ -31,6 +31,22 @@ class Settings(pydantic.BaseModel):
         """
 
 
+#: What patterns of fields allow, in words.
+_IN_WORDS: dict[str, str] = {}
+
+
+def matching(expression: str, allowed: str) -> str:
+    """Regular expression of a field, of which errors tell in words what is ``allowed``."""
+    _IN_WORDS[expression] = allowed
+    return expression
+
+
+#: A name that files and folders may have.
+FILE_NAME = matching(
+    r'^[A-Za-z0-9_][A-Za-z0-9_.-]*$',
+    'letters, digits, _ . and -; the first a letter, a digit or _',
+)
+
 #: Units at the end of a setting's name that kernels leave out; those of degrees become radians.
 _UNITS = (
     '',
@@ -148,6 +164,8 @@ def _allowed(error: dict, holders: list, field: pydantic.fields.FieldInfo | None
         if key in context:
             extra = field.json_schema_extra if field is not None else None
             return f'allowed: {context[key]}' + _others(extra)
+    if error['type'] == 'string_pattern_mismatch':
+        return f'allowed: {_IN_WORDS.get(context["pattern"], context["pattern"])}'
     found = (field is not None and limits(field)) or context
     bounds = [f'{word} {found[key]}' for key, word in BOUNDS.items() if key in found]
     return f'allowed: {" and ".join(bounds)}' if bounds else ''
@@ -250,6 +268,8 @@ def _mistake(item: dict, model: type[pydantic.BaseModel]) -> Mistake:
         message = 'unknown field'
     elif kind == 'missing':
         message = 'missing'
+    elif kind == 'string_pattern_mismatch':
+        message = ''
     elif kind in _NOT_A_MAPPING:
         message = 'expected a mapping of fields'
     elif kind in ('union_tag_invalid', 'union_tag_not_found'):

@@ -341,6 +341,30 @@ def test_who_comes_up_far_from_its_last_point_flies_on_to_it(tmp_path):
     assert done.exit_code == 0 and json.loads(done.stdout)['identical'], done.output
 
 
+@pytest.mark.parametrize('method', ['known', 'dead_reckoned'])
+def test_who_has_come_up_at_its_last_point_has_arrived_though_it_drifts_on(method, tmp_path):
+    """The current carries it out of the radius before the run is over. Over nodes too."""
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0], [300, 0]], 'arrival_radius_m': 60.0}
+    changes = {'dives': 0, 'duration_s': 5000.0, 'path': path, 'profile.depth_m': 40.0}
+    current = {'speed_mps': 0.4, 'direction_deg': 0.0}
+    changes |= {'current': current, 'profile.wait_s': 300.0, 'profile.surface_every_dives': 1}
+    changes |= {'navigation': {'method': method, 'current': 'forecast', 'forecast': current}}
+    changes |= {'sensors.gps_first_fix_s': 20.0, 'profile.prepare_s': 0.0}
+    runs = [
+        glider.fly('current_8deg', changes, engine=engine, bag=True, out=tmp_path / engine)
+        for engine in ('direct', 'nodes')
+    ]
+    data = runs[0].to_xarray()
+    at_end = data.stage.values == 7
+    assert np.count_nonzero(np.diff(at_end.astype(int))) == 1 and at_end[-1]
+    assert data.ground_truth_odom_north.values[-1] > 360.0
+    flown = [run.to_xarray().ground_truth_odom_north.values.tobytes() for run in runs]
+    assert flown[0] == flown[1]
+    for run in runs:
+        assert run.score['status'] == 'completed'
+        assert run.score['arrival']['arrived'] and run.score['arrival']['missed_m'] < 60.0
+
+
 def test_how_near_it_came_to_its_waypoints_is_told():
     corner = {'kind': 'waypoints', 'waypoints': [[0.0, 0.0], [300.0, 100.0], [300.0, 400.0]]}
     changes = {'path': corner, 'dives': 0, 'duration_s': 4000.0, 'profile.depth_m': 50.0}

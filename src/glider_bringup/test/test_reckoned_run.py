@@ -395,3 +395,19 @@ def test_panels_are_called_as_in_the_document(flown, tmp_path):
     for called in re.findall(r'^\| ([A-Z][^|]*) \|', DOCUMENT.read_text(encoding='utf-8'), re.M):
         parts = [called] if called in body else called.split(', ')
         assert all(part in body for part in parts), called
+
+
+def test_a_forecast_of_a_shear_costs_no_way_that_its_mean_would_not():
+    """Who turned against the water of every depth would make good less than half as much."""
+    shear = {'kind': 'shear', 'law': 'exponential', 'depth_m': 60.0, 'speed_mps': 0.6}
+    current = {'components': [{**shear, 'direction_deg': 90.0}]}
+    mean_mps = 0.6 * 0.6 * (1.0 - math.exp(-1.0 / 0.6))
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 20_000.0}
+    made_good = []
+    for forecast in (current, {'speed_mps': mean_mps, 'direction_deg': 90.0}):
+        told = {'navigation.current': 'forecast', 'navigation.forecast': forecast}
+        changes = {**RECKONED, 'current': current, 'path': path, **told}
+        flown = glider.fly('current_8deg', changes, duration=9000.0).to_xarray()
+        north = flown.ground_truth_odom_north
+        made_good.append(float(north[-1] - north[30_000]))
+    assert made_good[0] == pytest.approx(made_good[1], rel=0.05)

@@ -19,6 +19,9 @@ from glider_guidance.path.settings import WaypointPath
 from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import AT_END_OF_PATH, SURFACE_PREPARATION, WAITING_ON_SURFACE
 
+#: Where odom has the variances of its place, to the east and to the north.
+_VARIANCES = [13, 16]
+
 
 def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
     """What guidance is told when an order holds.
@@ -99,21 +102,28 @@ def _to(
     return Order(at_s=at_s, path=path)
 
 
-def misses_end(settings: GuidanceSettings, stage, odom) -> np.ndarray:
-    """Whether it is up at the end of its path, and too far from its last point, bool[n].
+def judged_end(
+    settings: GuidanceSettings, stage, odom, arrived: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whether it is up at the end of its path, too far from its last point or arrived, bool[n].
 
-    ``stage``, int[n], and ``odom``, float64[n, ...], the numbers of the topic, are those of ticks.
+    ``stage``, int[n], and ``odom``, float64[n, 17], the numbers of the topic, are those of ticks
+    without an order between them. It has arrived when it surely is near enough, by twice the
+    standard deviation of its place, and then may drift away; ``arrived`` says that it had before.
     """
     path, at_end = settings.path, np.equal(stage, AT_END_OF_PATH)
     if not at_end.any() or path.at_end != 'stop' or settings.profile.mode == 'path':
-        return np.zeros(len(at_end), bool)
+        return np.zeros((2, len(at_end)), bool)
     north, east, _ = path.points(0)[-1]
     off_m = np.hypot(odom[:, 1] - north, odom[:, 0] - east)
-    return at_end & (off_m > path.arrival_radius_m)
+    sure_m = off_m + 2.0 * np.sqrt(np.maximum(odom[:, _VARIANCES], 0.0).max(axis=1))
+    had = arrived & np.logical_and.accumulate(at_end)
+    has = had | np.logical_or.accumulate(at_end & (sure_m <= path.arrival_radius_m))
+    return at_end & (off_m > path.arrival_radius_m) & ~has, has
 
 
 def to_end(settings: GuidanceSettings, odom: Sequence[float], tick: int) -> Order | None:
-    """What guidance orders itself where it `misses_end`: to fly on to the last point."""
+    """What guidance orders itself where it missed its end: to fly on to the last point."""
     points = [tuple(map(float, settings.path.points(0)[-1]))]
     return _to(points, settings, odom, round(tick * TICK_S, 1))
 

@@ -19,6 +19,7 @@ from glider_base.errors import changes_text, shown
 from glider_base.files import is_file, read_yaml, yaml_line, yaml_text
 from glider_base.frames import OriginSettings, to_geodetic
 from glider_base.settings import (
+    FILE_NAME,
     ConfigurationError,
     Settings,
     SettingsT,
@@ -97,7 +98,10 @@ class RouteForecast(Settings):
         'current of the scenario',
     )
     error_mps: float = number(
-        0.0, (0.0, 1.0), 'rms of a random error of each part of the depth-averaged current (m/s)'
+        0.0,
+        (0.0, 1.0),
+        'rms of the error of each part of the depth-averaged current (m/s); a file has it, to the '
+        'truth one is added',
     )
     error_km: float = number(40.0, (5.0, 1000.0), 'correlation length of the error (km)')
     late_h: float = number(0.0, (0.0, 240.0), 'by what its water comes too late: its age (h)')
@@ -112,7 +116,7 @@ class Scenario(Settings):
     control_kind: ClassVar[type[ControlSettings]] = ControlSettings
 
     name: str = Field(
-        pattern=r'^[A-Za-z0-9_][A-Za-z0-9_.-]*$',
+        pattern=FILE_NAME,
         max_length=100,
         description='name, used for files',
     )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from glider_base.errors import ConfigurationError
+from glider_guidance.yo.stage import AT_END_OF_PATH, WAITING_ON_SURFACE
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.routing import pilot as piloting
 from glider_mission.routing.forecast_chart import (
@@ -172,6 +173,17 @@ def test_of_a_forecast_that_errs_is_believed_what_errors_leave_of_its_variance()
     assert error_mps == 0.0
 
 
+def test_a_file_errs_by_itself(hard):
+    """No error is added to it; of what it says is believed what its error leaves."""
+    scenario, sure = hard
+    file = SCENARIO_FOLDER / scenario.current.field.file
+    told = {**scenario.forecast.model_dump(), 'file': str(file), 'error_mps': 0.05}
+    found = forecast_of(load_scenario('eddies_hard', {'forecast': told}), 0.1)
+    left, error_mps = expected(sure.chart, 0.05)
+    np.testing.assert_array_equal(found.chart.current, left.current)
+    assert found.error_mps == error_mps
+
+
 def test_a_plan_counts_on_the_surface_for_the_time_of_the_stays(hard):
     """By eddies that are weaker with depth as exp(-z / 600 m): at the top twice their mean."""
     _, forecast = hard
@@ -321,6 +333,18 @@ def test_a_pilot_who_shall_not_replan_or_is_nearly_there_says_nothing(hard):
         pilot = Pilot(load_scenario('eddies_hard', {'guidance.replan': replan}))
         pilot.order(0, None)
         rows = [row_at(target, 1) for target in targets] + 8 * [row_at(place, 5)]
+        told = [pilot.order(LOOK_TICKS * k, row) for k, row in enumerate(rows, 1)]
+        assert any(told) == speaks
+
+
+def test_who_is_up_at_the_end_of_the_path_is_not_sent_away(hard):
+    """Where no leg leads to the last point any more, it has come by it."""
+    scenario, *_ = hard
+    *passed, end = waypoints_of(scenario)[1:]
+    for stage, speaks in ((WAITING_ON_SURFACE, True), (AT_END_OF_PATH, False)):
+        pilot = Pilot(scenario)
+        pilot.order(0, None)
+        rows = [row_at(target, 1) for target in passed] + 8 * [row_at(end + 3000.0, stage)]
         told = [pilot.order(LOOK_TICKS * k, row) for k, row in enumerate(rows, 1)]
         assert any(told) == speaks
 

@@ -134,6 +134,7 @@ UNKNOWN = [
     ({'profil': {}}, None, ['profil', 'unknown field', 'profile']),
     ({'profile': {'depht_m': 5.0}}, None, ['profile.depht_m = 5.0', 'unknown field', 'depth_m']),
     ({'profile': {'depth_m': math.nan}}, None, ['profile.depth_m = nan', 'finite', '10', '12000']),
+    ({'name': 'a b'}, None, ["name = 'a b' (allowed: letters, digits, _ . and -;"]),
     ({'seed': -1}, None, ['seed = -1', '>= 0']),
     ({'settle_s': -5.0}, None, ['settle_s = -5.0', '>= 0']),
     ({'profile': {'net_heaviness_kg': -0.4}}, None, ['profile.net_heaviness_kg = -0.4', '> 0']),

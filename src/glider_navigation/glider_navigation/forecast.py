@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A forecast of the current, as a vehicle takes it along on its mission.
 
-It is said in the words of the current of a scenario. Fixes tell two things of it: by how much it
-is off, and what share of it there is in the sea. The second is learnt from how the current changed
-from one way to the next, beside how that was forecast (recursive least squares): a forecast of
-eddies that are not there comes to be left out, and the last mean holds, as without a forecast.
+It is said in the words of the current of a scenario, and taken by its mean over the depth of the
+dives. Who steers by that does not turn against the water of every depth, which costs way in a
+shear: the mean of sqrt(U^2 - v^2) is less than that of the mean of v. Fixes tell two things of it:
+by how much it is off, and what share of it there is in the sea. The second is learnt from how the
+current changed from one way to the next, beside how that was forecast (recursive least squares): a
+forecast of eddies that are not there comes to be left out, and the last mean holds, as without a
+forecast.
 """
 
 from typing import NamedTuple
@@ -18,7 +21,10 @@ from glider_base.settings import number, positive
 from glider_base.signals import TICK_S, Vector
 from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
 from glider_model.ocean.current_settings import SumOfCurrents
+from glider_model.ocean.field import Mission
 
+#: Levels of a mean over depth.
+_LEVELS = 5
 #: No more of a forecast is believed than this share.
 MOST_SHARE = 1.5
 
@@ -35,6 +41,7 @@ class ForecastSettings(SumOfCurrents):
         'how far the share of the forecast that there is in the sea may be off 1, at first (-); '
         '0.0: it is taken whole, whatever fixes tell',
     )
+    late_h: float = number(0.0, (0.0, 240.0), 'by what its water comes too late: its age (h)')
 
     @pydantic.model_validator(mode='after')
     def _check_forecast(self):
@@ -44,6 +51,12 @@ class ForecastSettings(SumOfCurrents):
                     f"components.{i}.kind = 'gauss_markov': nobody forecasts what is random"
                 )
         return self
+
+    def resolved(self, course_rad: float, mission: Mission | None = None) -> 'ForecastSettings':
+        """As that of a current; what is late is asked for from before the mission on."""
+        if mission:
+            mission = mission.model_copy(update={'earlier_s': 3600.0 * self.late_h})
+        return super().resolved(course_rad, mission)
 
     @property
     def is_given(self) -> bool:
@@ -57,6 +70,7 @@ class Forecast(NamedTuple):
     is_believed: bool
     params: CurrentParams
     nothing: CurrentState  #: no part of it remembers anything
+    late_s: float = 0.0  #: age (s)
 
 
 class Trust(NamedTuple):
@@ -69,17 +83,26 @@ class Trust(NamedTuple):
 def make_forecast(settings: ForecastSettings, is_believed: bool) -> Forecast:
     """Forecast of some settings, or of none."""
     params = (settings if is_believed else ForecastSettings()).params()
-    return Forecast(is_believed, params, CurrentState(0, np.zeros(0)))
+    return Forecast(is_believed, params, CurrentState(0, np.zeros(0)), 3600.0 * settings.late_h)
 
 
 @kernel
-def forecast_at(forecast, place, depth, t_s):
-    """Current (m/s) that is forecast for a place (m), depth (m) and time since the start (s)."""
-    if not forecast.is_believed:
-        return Vector(0.0, 0.0)
-    position = (place.n, place.e, depth)
-    _, water = current_step_in_place(forecast.nothing, position, t_s, forecast.params, TICK_S)
-    return Vector(water.v_n, water.v_e)
+def forecast_at(forecast, place, depth, deepest, t_s):
+    """Current (m/s) that is forecast for a place (m) and time since the start (s).
+
+    The mean from the surface to ``deepest`` (m); if that is 0.0, that at the ``depth`` (m).
+    """
+    v_n, v_e = 0.0, 0.0
+    levels = _LEVELS if deepest > 0.0 else 1
+    for k in range(levels if forecast.is_believed else 0):
+        at = depth if levels == 1 else (k + 0.5) / levels * deepest
+        position, then_s = (place.n, place.e, at), t_s - forecast.late_s
+        _, water = current_step_in_place(
+            forecast.nothing, position, then_s, forecast.params, TICK_S
+        )
+        v_n += water.v_n / levels
+        v_e += water.v_e / levels
+    return Vector(v_n, v_e)
 
 
 @kernel

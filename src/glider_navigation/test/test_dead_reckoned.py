@@ -15,7 +15,7 @@ from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.block import navigation_tick
 from glider_navigation.current_belief import Uncertainty, initial_belief
-from glider_navigation.forecast import Trust, weigh
+from glider_navigation.forecast import ForecastSettings, Trust, forecast_at, make_forecast, weigh
 from glider_navigation.intake import is_refusing, take_in
 from glider_navigation.method import Fix, Heard, method_step
 from glider_navigation.methods.dead_reckoned import Way, _dive, _unforeseen, place_covariance
@@ -181,6 +181,38 @@ def test_a_forecast_changes_with_time_and_depth_as_it_says(dives):
         plain.place(truth.end(1)) - plain.place(truth.begun(1))
     )
     assert led[1] == pytest.approx(0.2 * 0.75 * WAY_S, rel=0.02)
+
+
+def test_a_forecast_is_taken_by_its_mean_over_the_depth_of_the_dive_before(dives):
+    """In the first way by what it is at the depth, for nobody knows how deep that leads.
+
+    There is no shear in this sea: after the first way its mean is taken off.
+    """
+    truth = dives([30.0, 40.0])
+    shear = {'kind': 'table', 'rows': [[0.0, 0.2, 0.0], [truth.depths.max(), 0.0, 0.0]]}
+    plain, told = (
+        navigate(truth, current='forecast', forecast={'components': more})
+        for more in (FORECAST['components'], [*FORECAST['components'], shear])
+    )
+    for way, means in ((0, (0.15, 0.05)), (1, (0.0, 0.0))):
+        begin, end = truth.begun(way), truth.end(way)
+        ticks = np.linspace(begin, end, 5).astype(int)[:3]
+        led = [told.place(tick)[0] - plain.place(tick)[0] for tick in ticks]
+        assert np.diff(led) == pytest.approx(0.25 * WAY_S * np.array(means), abs=6.0)
+
+
+@pytest.mark.parametrize('deepest', [0.0, 300.0])
+def test_a_forecast_that_is_late_tells_what_was_before(deepest):
+    tide = {'kind': 'tidal', 'speed_mps': 0.3, 'direction_deg': 20.0, 'ellipticity': 0.4}
+    now, late = (
+        make_forecast(ForecastSettings(components=[tide], late_h=hours), True)
+        for hours in (0.0, 2.5)
+    )
+    then, told = (
+        forecast_at(one, Vector(1.0, 2.0), 40.0, deepest, t_s)
+        for one, t_s in ((now, 1000.0), (late, 10_000.0))
+    )
+    assert tuple(told) == pytest.approx(tuple(then))
 
 
 def test_changes_of_a_forecast_are_told_from_what_it_said_at_the_start(dives):

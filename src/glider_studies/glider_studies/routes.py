@@ -23,32 +23,44 @@ SIZES, SEAS = (0.18, 0.3, 0.42), 4
 #: The first sea; those that are shipped are of other seeds.
 FIRST = 1000
 _PLANNED = {'guidance.route': 'planned', 'guidance.replan': 'surfacing'}
-#: Planned with the true sea for a forecast, and ways to cross it: the forecast is 12 h late then,
-#: or has an error of 0.15 m/s as well.
-PLAN = 'plan'
+#: Planned with the true sea for a forecast, and ways to cross it. Forecasts are so late then (h),
+#: of who plans and of the vehicle, or have errors as well (m/s, rms of each part).
+LATE_H, ERROR_MPS = 12.0, 0.15
+PLAN, ERRING = 'plan', 'erring'
 WAYS: dict[str, dict[str, Any]] = {
     PLAN: {'forecast.late_h': 0.0},
     'straight': {},
     'planned': _PLANNED,
-    'erring': {**_PLANNED, 'forecast.error_mps': 0.15},
+    ERRING: {**_PLANNED, 'forecast.error_mps': ERROR_MPS},
 }
 #: A planned route takes at most this share of the time of straight legs, and by a forecast that
 #: errs never more than this share.
 GAIN, LOSS = 0.9, 1.1
 
 
-def scenario_in(sea: Path, way: str) -> Scenario:
-    """The mission in a sea, in one of `WAYS`."""
-    return load_scenario('eddies_10d', {'orders': [], 'current.field.file': str(sea), **WAYS[way]})
+def scenario_in(sea: Path, forecast: Path, way: str) -> Scenario:
+    """The mission in a sea, in one of `WAYS`; a forecast is taken along."""
+    believed = {'field': {'kind': 'grid', 'file': str(forecast)}, 'late_h': LATE_H}
+    changes = {
+        'orders': [],
+        'current.field.file': str(sea),
+        'forecast.file': str(forecast),
+        'forecast.late_h': LATE_H,
+        'navigation.current': 'forecast',
+        'navigation.forecast': believed,
+    }
+    return load_scenario('eddies_10d', {**changes, **WAYS[way]})
 
 
 def cross_one(task: tuple[int, float, str]) -> dict[str, Any]:
     """Make a sea by its seed and rms, and plan or fly the mission in it, in a worker."""
     seed, rms_mps, way = task
     with TemporaryDirectory() as folder:
-        sea = Path(folder) / 'sea.nc'
-        write_sea(EddyingSea(seed=seed, rms_mps=rms_mps), sea)
-        scenario = scenario_in(sea, way)
+        sea, forecast = Path(folder) / 'sea.nc', Path(folder) / 'forecast.nc'
+        off = ERROR_MPS if way == ERRING else 0.0
+        for file, error in (sea, 0.0), (forecast, off):
+            write_sea(EddyingSea(seed=seed, rms_mps=rms_mps, error_mps=error), file)
+        scenario = scenario_in(sea, forecast, way)
         if way == PLAN:
             sure = plan(scenario)
             return {

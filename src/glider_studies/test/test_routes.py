@@ -31,13 +31,15 @@ def test_each_check_fails_by_what_it_is_about(changes, failed):
 
 def test_the_mission_is_the_shipped_one_in_another_sea(tmp_path):
     write_sea(EddyingSea(seed=1000, rms_mps=0.3), tmp_path / 'sea.nc')
-    flown = {way: scenario_in(tmp_path / 'sea.nc', way) for way in WAYS if way != PLAN}
+    files = 2 * (tmp_path / 'sea.nc',)
+    flown = {way: scenario_in(*files, way) for way in WAYS if way != PLAN}
     assert {way: one.guidance.route for way, one in flown.items()} == {
         'straight': 'straight',
         'planned': 'planned',
         'erring': 'planned',
     }
-    assert {one.forecast.late_h for one in flown.values()} == {12.0}
+    late_h = {(one.forecast.late_h, one.navigation.forecast.late_h) for one in flown.values()}
+    assert late_h == {(12.0, 12.0)}
     assert [one.forecast.error_mps for one in flown.values()] == [0.0, 0.0, 0.15]
     assert not any(one.orders for one in flown.values())
     for one in flown.values():

@@ -268,7 +268,7 @@ MISTAKES = {
     ),
     'name with a space': (
         {'dimensions': {'my x': SPEED}},
-        ['dimensions.my x', 'pattern'],
+        ['dimensions.my x', 'letters, digits and _'],
     ),
     'one field in two dimensions': (
         {'dimensions': {'a': SPEED, 'b': {**SPEED, 'field': 'current.speed_mps'}}},

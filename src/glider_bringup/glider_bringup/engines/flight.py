@@ -34,7 +34,7 @@ from glider_guidance.orders import (
     check_orders,
     due,
     is_surfaced,
-    misses_end,
+    judged_end,
     reaction,
     ticks_alone,
     to_end,
@@ -93,6 +93,7 @@ class Past:
     tick: int = 0  #: ticks flown
     stage: int = -1  #: of guidance, at the last one; -1: there was none
     no_progress: int = 0  #: what guidance told of that then
+    arrived: bool = False  #: it is at the end of its path, and was near enough to its last point
     battery: Battery = Battery(*WHEN_SILENT['battery'])  #: what it said then
     own: tuple[Order, ...] = ()  #: what it orders itself by that, to come
     #: what held until now, and whether it was given
@@ -189,7 +190,7 @@ class Held:
                 raise
             filled += flown
             self.past.tick += flown
-            self._look(log[filled - 1])
+            self._look(log[filled - flown : filled])
         return filled, is_over
 
     def _until_ordered(self, log: np.ndarray) -> tuple[int, bool]:
@@ -202,7 +203,7 @@ class Held:
         reacts = self._settings.no_progress != 'tell'
         up = np.flatnonzero(is_surfaced(log[:rows, _STAGE])) if waits else ()
         stays = begins(log[:rows, _NO_PROGRESS], self.past.no_progress) if reacts else ()
-        astray = np.flatnonzero(misses_end(self._settings, log[:rows, _STAGE], log[:rows, _ODOM]))
+        astray = np.flatnonzero(self._judged_end(log[:rows])[0])
         last = min((int(at[0]) + 1 for at in (up, stays, astray) if len(at)), default=rows)
         if last < rows:  # again, and no further
             set_held(self._held, before)
@@ -218,15 +219,20 @@ class Held:
                 return self._until_raised(log[: len(log) // 2])
             raise FlightError(at_tick(raised(error), self.past.tick)) from error
 
-    def _look(self, row: np.ndarray) -> None:
+    def _judged_end(self, log: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return judged_end(self._settings, log[:, _STAGE], log[:, _ODOM], self.past.arrived)
+
+    def _look(self, log: np.ndarray) -> None:
         """Note what guidance and battery told at the last tick, and what it orders itself."""
-        self._row = row.copy()
+        self._row = row = log[-1].copy()
         before, self.past.no_progress = self.past.no_progress, int(row[_NO_PROGRESS])
         self.past.stage, self.past.battery = int(row[_STAGE]), Battery(*row[_BATTERY].tolist())
         if self.past.no_progress and not before:
             order = reaction(self._settings, self.past.no_progress, row[_ODOM], self.past.tick)
             self.past.own = (order,) if order else ()
-        if misses_end(self._settings, [self.past.stage], row[None, _ODOM])[0]:
+        misses, arrived = self._judged_end(log)
+        self.past.arrived = bool(arrived[-1])
+        if misses[-1]:
             order = to_end(self._settings, row[_ODOM], self.past.tick)
             self.past.own = (order,) if order else ()
 
@@ -253,6 +259,7 @@ class Held:
             settings, known = self._scenario.guidance_settings(), 0
         for order, _ in followed[known:]:
             settings = changed(settings, order)
+        self.past.arrived &= settings.path == self._settings.path
         self._settings, self.past.followed = settings, followed
         # who ends the run knows what was ordered from outside, as over nodes
         outside = tuple(order for order, given in followed if given)

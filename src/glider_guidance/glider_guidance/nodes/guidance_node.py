@@ -25,7 +25,7 @@ from glider_base.signals import Battery, Water
 from glider_base.wiring import MAP, SLOW_S, WHEN_SILENT
 from glider_guidance.block import GUIDANCE
 from glider_guidance.order import Order
-from glider_guidance.orders import changed, due, misses_end, reaction, to_end
+from glider_guidance.orders import changed, due, judged_end, reaction, to_end
 from glider_guidance.status import status_of
 
 #: Number of points of the published path.
@@ -63,6 +63,7 @@ class GuidanceNode(BlockNode):
         self.waiting = list(self.settings.orders)
         self.tick = -1  #: the last one, by the time that passes in the steps
         self.answer = ''  #: to the last order
+        self.arrived = False  #: at the end of the path
         self.battery, self.battery_ns = Battery(*WHEN_SILENT['battery']), 0  #: and when it said so
 
     def tell_path(self, stamp_ns: int) -> None:
@@ -78,13 +79,16 @@ class GuidanceNode(BlockNode):
             self.follow(stamp_ns, order)
         if self.settings.path != self.path_published:
             self.tell_path(stamp_ns)
+            self.arrived = False
         before = self.flags[2] if self.flags else 0
         super().step(stamp_ns, *inputs)
         no_progress = self.flags[2]
         if no_progress and not before:
             order = reaction(self.settings, no_progress, inputs[0], self.tick + 1)
             self.waiting += [order] if order else []
-        if misses_end(self.settings, self.flags[:1], np.array(inputs[:1]))[0]:
+        ends = judged_end(self.settings, self.flags[:1], np.array(inputs[:1]), self.arrived)
+        (misses,), (self.arrived,) = ends
+        if misses:
             order = to_end(self.settings, inputs[0], self.tick + 1)
             self.waiting += [order] if order else []
         if stamp_ns // SECOND_NS != self.second:

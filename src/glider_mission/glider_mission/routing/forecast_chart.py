@@ -111,8 +111,9 @@ def forecast_of(scenario: Scenario, stay: float) -> Forecast:
         land |= np.array([[bottom_depth(n, e, bottom) <= 0.0 for e in easts] for n in norths])
     error_mps = forecast.error_mps
     if error_mps > 0.0:
-        erring = erroneous(chart, error_mps, forecast.error_km, scenario.seed, 0)
-        chart, error_mps = expected(erring, error_mps)
+        if not forecast.file:  # which errs by itself
+            chart = erroneous(chart, error_mps, forecast.error_km, scenario.seed, 0)
+        chart, error_mps = expected(chart, error_mps)
     return Forecast(chart, stays, land, error_mps)
 
 

@@ -16,6 +16,7 @@ from glider_base.signals import TICK_S
 from glider_guidance.order import Order
 from glider_guidance.orders import is_surfaced
 from glider_guidance.path.settings import WaypointPath
+from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS
 from glider_mission.routing.forecast_chart import forecast_of, observed
 from glider_mission.routing.fronts import line_arrival
@@ -86,7 +87,10 @@ class Pilot:
             return None
         place, target = (np.array([row[at + 1], row[at]]) for at in (_ODOM, _TARGET))
         self._pass(target)
-        if not is_surfaced(int(row[_STAGE])):
+        stage = int(row[_STAGE])
+        if stage == AT_END_OF_PATH:  # it has arrived, or guidance has it fly on to the last point
+            return None
+        if not is_surfaced(stage):
             self._up_s, self._was_ordered = 0.0, False
             return None
         self._up_s += LOOK_TICKS * TICK_S

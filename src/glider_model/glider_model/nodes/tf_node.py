@@ -20,7 +20,7 @@ from glider_base.ros.lockstep.executor import Gate, take
 from glider_base.ros.lockstep.process import entry
 from glider_base.ros.parameters import declare_settings
 from glider_base.ros.wire import qos
-from glider_base.settings import ConfigurationError, Settings, number
+from glider_base.settings import ConfigurationError, Settings, matching, number
 
 #: What tf2's own broadcasters offer.
 TF_QOS = QoSProfile(depth=100)
@@ -31,7 +31,7 @@ class TfSettings(Settings):
 
     frame_prefix: str = Field(
         '',
-        pattern=r'^[A-Za-z0-9_/]*$',
+        pattern=matching(r'^[A-Za-z0-9_/]*$', 'letters, digits, _ and /'),
         description='put before base_link, such as one/; the frame map is common to all vehicles',
     )
     rate_hz: float = number(50.0, (0.1, 1000.0), 'most transforms in a second of wall time (1/s)')

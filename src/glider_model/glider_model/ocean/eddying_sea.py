@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field
 
-from glider_base.settings import Settings, number
+from glider_base.settings import Settings, matching, number
 
 #: Levels (m), steps of grid (deg) and time (s), and what an integer of the file stands for (m/s).
 _DEPTHS = (0.5, 10.0, 30.0, 75.0, 150.0, 300.0, 500.0, 750.0, 1050.0)
@@ -39,7 +39,11 @@ class EddyingSea(Settings):
     radius_km: float = number(35.0, (10.0, 200.0), 'R of its eddies, about (km)')
     decay_m: float = number(600.0, (50.0, 5000.0), 'depth of 1/e (m)')
     days: int = number(16, (1, 400), 'days from its first time to its last (1)')
-    start: str = Field('2026-03-01', pattern=r'^\d{4}-\d\d-\d\d$', description='its first time')
+    start: str = Field(
+        '2026-03-01',
+        pattern=matching(r'^\d{4}-\d\d-\d\d$', 'a day such as 2026-03-01'),
+        description='its first time',
+    )
     south_deg: float = number(34.9, (-80.0, 80.0), 'its edges (deg)')
     north_deg: float = number(37.7, (-80.0, 80.0), 'its edges (deg)')
     west_deg: float = number(120.3, (-180.0, 360.0), 'its edges (deg)')

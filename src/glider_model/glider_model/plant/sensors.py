@@ -38,7 +38,7 @@ from glider_base.frames import (
 )
 from glider_base.kernel import kernel, replace
 from glider_base.noise import normal_pair, random_stream, uniform
-from glider_base.settings import Settings, derived, number
+from glider_base.settings import Settings, derived, matching, number
 from glider_base.signals import TICK_S, Imu, Odometry
 from glider_base.wiring import ALTIMETER_REACH_M, NO_ECHO, SENSORS
 from glider_model.ocean.density import pressure_at
@@ -102,7 +102,7 @@ class SensorSettings(Settings):
     )
     fix_missed_pattern: str = Field(
         '0',
-        pattern='^[01]{1,60}$',
+        pattern=matching('^[01]{1,60}$', '1 to 60 digits, each 0 or 1'),
         description='which surfacings have no fix, over and over from the launch on: 1 has none',
     )
     altimeter_period_s: float = number(

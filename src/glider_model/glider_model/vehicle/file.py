@@ -15,7 +15,15 @@ from pydantic import Field
 from glider_base import plugins
 from glider_base.errors import changes_text
 from glider_base.files import read_bytes, read_yaml, yaml_line, yaml_text
-from glider_base.settings import Settings, file_names, find_field, find_file, holder_of, validate
+from glider_base.settings import (
+    Settings,
+    file_names,
+    find_field,
+    find_file,
+    holder_of,
+    matching,
+    validate,
+)
 from glider_base.signals import Joints
 from glider_base.wiring import JOINTS
 from glider_model.vehicle import surfaces
@@ -53,7 +61,13 @@ _SET = '--set'
 class _Body(Settings):
     """What every vehicle file says."""
 
-    name: Annotated[str, Field(pattern=r'^[a-z0-9_]+$', description='its name')]
+    name: Annotated[
+        str,
+        Field(
+            pattern=matching(r'^[a-z0-9_]+$', 'small letters, digits and _'),
+            description='its name',
+        ),
+    ]
     description: Annotated[str, Field(description='what it is, in a line')]
     rigid_body: RigidBodySettings
     moving_mass: MovingMassSettings

@@ -101,6 +101,8 @@ class Way(NamedTuple):
     believed: Vector = _STILL  #: way by the current that was believed (m)
     forecast: Vector = _STILL  #: way by the current that was forecast (m)
     t_s: float = 0.0  #: time under water
+    deepest: float = 0.0  #: depth that it led to (m)
+    before: float = 0.0  #: that of the way before (m)
     cos_s: float = 0.0  #: integrals of cos(w t) and sin(w t) over it (s)
     sin_s: float = 0.0
 
@@ -187,14 +189,15 @@ def _learn(current, trust, column, way, stay, params):
 def _dive(way, stay):
     """The way that begins with a dive: a new one, if the stay had a fix."""
     if stay.fixes > 0:
-        return replace(_NO_WAY, begun=stay.place, variance=stay.known.pp)
+        before = way.deepest if way.t_s >= SHORTEST_WAY_S else way.before
+        return replace(_NO_WAY, begun=stay.place, variance=stay.known.pp, before=before)
     drifted = minus(plus(way.through, stay.place), stay.came_up)
     more = surface_stay.drifted_variance(stay)
     return replace(way, variance=way.variance + more, through=drifted)
 
 
 @kernel
-def _go_on(way, through, current, predicted, t_s, dt):
+def _go_on(way, through, current, predicted, depth, t_s, dt):
     """The way a tick later, at velocities through the water, of current and forecast (m/s)."""
     return replace(
         way,
@@ -202,6 +205,7 @@ def _go_on(way, through, current, predicted, t_s, dt):
         believed=plus(way.believed, current, dt),
         forecast=plus(way.forecast, predicted, dt),
         t_s=way.t_s + dt,
+        deepest=max(way.deepest, depth),
         cos_s=way.cos_s + dt * math.cos(TIDE * t_s),
         sin_s=way.sin_s + dt * math.sin(TIDE * t_s),
     )
@@ -210,7 +214,7 @@ def _go_on(way, through, current, predicted, t_s, dt):
 @kernel
 def _at_the_top(place, t_s, current, trust, params):
     """Current (m/s) that is believed for a place at the surface (m) and a time (s)."""
-    predicted = forecast_at(params.forecast, place, 0.0, t_s)
+    predicted = forecast_at(params.forecast, place, 0.0, 0.0, t_s)
     return plus(belief.current_at(current, t_s), predicted, trust.share)
 
 
@@ -249,7 +253,7 @@ def _change_over(state, under, t_s, params):
     way, stay, current = state.way, state.stay, state.current
     trust, column = state.trust, state.column
     if state.tick == 0:
-        column = forecast_at(params.forecast, state.place, 0.0, t_s)
+        column = forecast_at(params.forecast, state.place, 0.0, 0.0, t_s)
     if under and not state.under:
         if stay.fixes > 0:
             current, trust = _learn(current, trust, column, way, stay, params)
@@ -315,9 +319,11 @@ def dead_reckoned_step(state, heard, params, dt):
     if under:
         psi = attitude.angles.psi
         through = Vector(flight.speed * math.cos(psi), flight.speed * math.sin(psi))
-        predicted = forecast_at(params.forecast, state.place, flight.depth, t_s)
+        # in the first dive nobody knows as yet how deep it will be
+        deepest = max(way.before, way.deepest) if way.before > 0.0 else 0.0
+        predicted = forecast_at(params.forecast, state.place, flight.depth, deepest, t_s)
         water = plus(belief.current_at(current, t_s), predicted, trust.share)
-        way = _go_on(way, through, water, predicted, t_s, dt)
+        way = _go_on(way, through, water, predicted, flight.depth, t_s, dt)
         place, velocity = _end_of(way), plus(through, water)
         covariance = place_covariance(way, current, trust, column, params)
         phase = UNDER_WATER

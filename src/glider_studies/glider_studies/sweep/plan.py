@@ -24,7 +24,15 @@ from pydantic import Field
 from glider_base.errors import shown
 from glider_base.files import is_file, read_text, read_yaml, yaml_line, yaml_text
 from glider_base.kernel import source_digest
-from glider_base.settings import ConfigurationError, Settings, file_names, find_file, validate
+from glider_base.settings import (
+    FILE_NAME,
+    ConfigurationError,
+    Settings,
+    file_names,
+    find_file,
+    matching,
+    validate,
+)
 from glider_mission.changes import overlap, run_command
 from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import (
@@ -43,7 +51,7 @@ MAX_CELLS = 500_000
 #: No dimension has more values: each of them is checked before anything is flown.
 MAX_VALUES = 10_000
 
-_NAME = r'^[A-Za-z][A-Za-z0-9_]*$'
+_NAME = matching(r'^[A-Za-z][A-Za-z0-9_]*$', 'letters, digits and _; the first a letter')
 Value = bool | int | float | str
 
 
@@ -194,7 +202,7 @@ class Sweep(Settings):
     """A sweep as its file says it."""
 
     name: str = Field(
-        pattern=r'^[A-Za-z0-9_][A-Za-z0-9_.-]*$',
+        pattern=FILE_NAME,
         max_length=100,
         description='name, used for files',
     )
