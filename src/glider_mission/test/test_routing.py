@@ -320,6 +320,32 @@ def test_a_waypoint_that_the_current_leads_past_is_not_gone_round_an_eddy_for(tm
         assert (nearest > 2000.0) == is_passed
 
 
+def test_a_route_is_flown_that_a_slower_vehicle_can_follow(tmp_path):
+    """At a place from where the fastest route crosses an eddy by nothing to spare."""
+    write_sea(EddyingSea(seed=3010, rms_mps=0.42), tmp_path / 'sea.nc')
+    sea = {'orders': [], 'current.field.file': str(tmp_path / 'sea.nc')}
+    sea |= {'guidance.route': 'planned', 'guidance.replan': 'surfacing'}
+    scenario, t_s = load_scenario('eddies_10d', sea), 267_000.0
+    place = np.array([68_100.0, 5200.0])
+    pace, ways = pace_of(scenario), waypoints_of(scenario)
+    forecast = forecast_of(scenario, pace.stay)
+    chart, left = forecast.sailed(forecast.chart), np.vstack((place, ways[3:]))
+    fastest = route_through(chart, left, t_s, pace.speed, END_S)
+    pilot = Pilot(scenario)
+    pilot.order(0, None)
+    rows = [*(row_at(way, 1) for way in ways[1:3]), *(8 * [row_at(place, 5)])]
+    told = [pilot.order(2_670_000 + LOOK_TICKS * k, row) for k, row in enumerate(rows, -7)]
+    (order,) = filter(None, told)
+    flown = np.array([one[:2] for one in order.path.waypoints])
+    times = [
+        sailed_s(chart, way, t_s, share * pace.speed, t_s + 1e6) - t_s
+        for way, share in ((fastest.corners, 0.95), (flown, 0.95), (flown, 1.0))
+    ]
+    assert times[0] == math.inf
+    assert times[1] < 110.0 * 3600.0
+    assert times[2] < fastest.passed_s[-1] - t_s + 12.0 * 3600.0
+
+
 def test_a_pilot_who_shall_not_replan_or_is_nearly_there_says_nothing(hard):
     """Nearly there is who has the last point alone to come to, and a straight leg leads there."""
     scenario, *_ = hard

@@ -21,6 +21,7 @@ from glider_mission.blocks import COLUMNS
 from glider_mission.routing.forecast_chart import forecast_of, observed
 from glider_mission.routing.fronts import line_arrival
 from glider_mission.routing.plan import (
+    Route,
     as_dived,
     crossing,
     pace_of,
@@ -39,6 +40,9 @@ _LISTEN_S = 180.0
 #: carried past one this near (m) to which no straight leg leads, nor any route within so long (s).
 #: From this near on to the last, nothing changes while a straight leg leads there.
 _PASSED_M, _NEAR_M, _ROUND_S = 2000.0, 8000.0, 86_400.0
+#: A route for so much less speed is flown where it takes no longer than the fastest one by this
+#: time (s): who falls behind on that may miss its last chance to cross an eddy.
+_SPARED, _LATER_S = 0.95, 43_200.0
 #: A planned route has to be faster than straight legs by this share, in the middle of the errors
 #: that the forecast may have.
 LEAST_GAIN = 0.03
@@ -125,6 +129,15 @@ class Pilot:
         """Whether a route of no more than `_ROUND_S` leads to the first of what is left."""
         return route_round(*coast, left[:2], t_s, self._speed, t_s + _ROUND_S).arrives
 
+    def _route(self, coast: tuple, left: np.ndarray, t_s: float) -> Route:
+        """Route through what is left, with speed to spare where that costs little."""
+        fastest, spared = (
+            route_round(*coast, left, t_s, share * self._speed, t_s + _HORIZON_S)
+            for share in (1.0, _SPARED)
+        )
+        is_early = spared.arrives and spared.passed_s[-1] < fastest.passed_s[-1] + _LATER_S
+        return spared if is_early else fastest
+
     def _told(self, t_s: float, place: np.ndarray) -> Order | None:
         """Order to follow the best route from a place; None where it follows that already."""
         seen = np.array(self._seen).reshape(-1, 5)
@@ -138,7 +151,7 @@ class Pilot:
                 return None
             if not (leads or is_last or self._comes_round(coast, left, t_s)):
                 self._next, left = self._next + 1, np.delete(left, 1, axis=0)
-        route = route_round(*coast, left, t_s, self._speed, end_s)
+        route = self._route(coast, left, t_s)
         is_land = crossing(*coast, left) is not None
         seas = [chart._replace(current=chart.current + error) for error in self._errors]
         planned_s, straight_s = (

@@ -63,7 +63,7 @@ class TickSettings(Settings):
         5.0, (0.1, 3600.0), 'wall time in which a tick has to be complete (s)'
     )
     input_max_age_s: float = number(
-        1.0, (0.05, 3600.0), 'free-running: older input counts as stale (s)'
+        1.0, (0.2, 3600.0), 'free-running: older input counts as stale, two cycles or more (s)'
     )
     message_faults: list[MessageFault] = Field(
         [], description='what goes wrong with messages of this node'
