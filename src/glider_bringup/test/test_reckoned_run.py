@@ -397,6 +397,15 @@ def test_panels_are_called_as_in_the_document(flown, tmp_path):
         assert all(part in body for part in parts), called
 
 
+def test_a_strong_current_that_is_forecast_is_believed_from_the_launch_on():
+    """Else the velocity would jump as the vehicle dives, and be refused."""
+    current = {'speed_mps': 1.2, 'direction_deg': 90.0}
+    told = {'navigation.current': 'forecast', 'navigation.forecast': current, 'current': current}
+    told |= {'sensors.gps_first_fix_s': 600.0, 'profile.prepare_s': 10.0}
+    run = glider.fly('current_8deg', {**RECKONED, **told}, duration=300.0)
+    assert run.score['guard']['events'] == []
+
+
 def test_a_forecast_of_a_shear_costs_no_way_that_its_mean_would_not():
     """Who turned against the water of every depth would make good less than half as much."""
     shear = {'kind': 'shear', 'law': 'exponential', 'depth_m': 60.0, 'speed_mps': 0.6}

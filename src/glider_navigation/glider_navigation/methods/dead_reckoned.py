@@ -254,6 +254,7 @@ def _change_over(state, under, t_s, params):
     trust, column = state.trust, state.column
     if state.tick == 0:
         column = forecast_at(params.forecast, state.place, 0.0, 0.0, t_s)
+        stay = replace(stay, drift=plus(stay.drift, column, trust.share))
     if under and not state.under:
         if stay.fixes > 0:
             current, trust = _learn(current, trust, column, way, stay, params)
