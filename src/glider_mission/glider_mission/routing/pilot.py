@@ -135,8 +135,10 @@ class Pilot:
             route_round(*coast, left, t_s, share * self._speed, t_s + _HORIZON_S)
             for share in (1.0, _SPARED)
         )
-        is_early = spared.arrives and spared.passed_s[-1] < fastest.passed_s[-1] + _LATER_S
-        return spared if is_early else fastest
+        if not (fastest.arrives and spared.arrives):
+            return fastest
+        later_s = spared.passed_s[-1] - fastest.passed_s[-1]
+        return spared if later_s < _LATER_S else fastest
 
     def _told(self, t_s: float, place: np.ndarray) -> Order | None:
         """Order to follow the best route from a place; None where it follows that already."""
