@@ -237,7 +237,7 @@ def test_vehicle_by_path(edited):
             [1.0, True, 3.0],
             'added_mass.linear.value.1 = True: should be a valid number',
         ),
-        ('name', 'My Glider', "name = 'My Glider': "),
+        ('name', 'My Glider', "name = 'My Glider' (allowed: small letters, digits and _)"),
     ],
 )
 def test_message_names_file_field_value_and_range(edited, field, value, expected):
