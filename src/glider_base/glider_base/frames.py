@@ -222,6 +222,10 @@ def covariance_to_wire(covariance):
     return covariance.ee, covariance.ne, covariance.ne, covariance.nn
 
 
+#: Which numbers of an odometry on the wire are variances of its place, east and north.
+VARIANCES = [13, 16]
+
+
 @kernel
 def covariance_from_wire(odom):
     """Covariance of the horizontal place of an odometry, from its numbers."""

@@ -407,7 +407,7 @@ def test_a_strong_current_that_is_forecast_is_believed_from_the_launch_on():
 
 
 def test_a_forecast_of_a_shear_costs_no_way_that_its_mean_would_not():
-    """Who turned against the water of every depth would make good less than half as much."""
+    """Who turned against the water of every depth would make good less."""
     shear = {'kind': 'shear', 'law': 'exponential', 'depth_m': 60.0, 'speed_mps': 0.6}
     current = {'components': [{**shear, 'direction_deg': 90.0}]}
     mean_mps = 0.6 * 0.6 * (1.0 - math.exp(-1.0 / 0.6))

@@ -12,15 +12,13 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import pydantic
 
+from glider_base.frames import VARIANCES
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_guidance.order import Order
 from glider_guidance.path.settings import WaypointPath
 from glider_guidance.settings import GuidanceSettings
 from glider_guidance.yo.stage import AT_END_OF_PATH, SURFACE_PREPARATION, WAITING_ON_SURFACE
-
-#: Where odom has the variances of its place, to the east and to the north.
-_VARIANCES = [13, 16]
 
 
 def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
@@ -116,7 +114,7 @@ def judged_end(
         return np.zeros((2, len(at_end)), bool)
     north, east, _ = path.points(0)[-1]
     off_m = np.hypot(odom[:, 1] - north, odom[:, 0] - east)
-    sure_m = off_m + 2.0 * np.sqrt(np.maximum(odom[:, _VARIANCES], 0.0).max(axis=1))
+    sure_m = off_m + 2.0 * np.sqrt(np.maximum(odom[:, VARIANCES], 0.0).max(axis=1))
     had = arrived & np.logical_and.accumulate(at_end)
     has = had | np.logical_or.accumulate(at_end & (sure_m <= path.arrival_radius_m))
     return at_end & (off_m > path.arrival_radius_m) & ~has, has
