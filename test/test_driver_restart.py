@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A driver that is killed in flight and is back within seconds: flown on, told, recorded.
 
-Driver, autopilot and recorder are processes of their own. What the middleware knows of the dead
-driver stays listed for longer than the guard would wait. What it publishes is reliable at first,
-and once it is back with best effort.
+A simulated plant of somebody else ends its run meanwhile. Driver, autopilot and recorder are
+processes of their own. What the middleware knows of the dead driver stays listed for longer than
+the guard would wait. What it publishes is reliable at first, and once it is back with best effort.
 """
 
 import json
@@ -80,6 +80,26 @@ rclpy.init(args=sys.argv)
 driver = OurDriver(Glider())
 driver.start()
 rclpy.spin(driver)
+"""
+#: A recorder to which the middleware tells the names of nodes after their first messages.
+LATE_NAMES = """
+import sys
+from glider_base.ros.lockstep import peers
+from glider_bringup.nodes import recorder_node
+
+told, named = peers.publishers, set()
+
+
+def publishers(node, topic):
+    names = told(node, topic)
+    if names and topic.name not in named:
+        named.add(topic.name)
+        return dict.fromkeys(names, '')
+    return names
+
+
+peers.publishers = publishers
+sys.exit(recorder_node.main())
 """
 #: The driver is away for so long (s), and what follows.
 AWAY_S, AFTER_S, DEADLINE_S = 3.5, 6.0, 120.0
@@ -170,7 +190,9 @@ def flight(tmp_path_factory):
         try:
             autopilot = start([*aboard, '-p', 'record:=false'])
             with printed.open('w') as stream:
-                recorder = start(commands[RECORDER], stdout=stream)
+                recorder = start(
+                    [python, '-c', LATE_NAMES, *commands[RECORDER][3:]], stdout=stream
+                )
             nodes = {'guidance_node', 'control_node', 'guard_node', RECORDER}
             heard.until(lambda: heard.ready >= nodes)
             first = start([*driver, 'reliable', *space])

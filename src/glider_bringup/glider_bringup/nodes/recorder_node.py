@@ -212,14 +212,24 @@ class RecorderNode(TickNode):
     def on_report(self, report: health.Report) -> None:
         """Learn the last tick from the plant, and keep what it says about the end."""
         name = f'{self.get_namespace().rstrip("/")}/{topics.PLANT}'
-        heard = {item.owner.name for item in self.inputs if item.stamp_ns >= 0}
-        if not self.ticks.lockstep and not heard & {name, ''}:  # '': nobody knows whom
+        heard = (item for item in self.inputs if item.stamp_ns >= 0)
+        if not self.ticks.lockstep and not any(self.may_be(name, item) for item in heard):
             return  # that of somebody else: the vehicle is another
         if report.node == topics.PLANT and report.phase in (health.FINISHED, health.FAILED):
             self.over_since_s = time.monotonic()
             self.final_ns = report.stamp_ns if report.phase == health.FINISHED else -1
             named = report._replace(node=name, process='')
             self.end = report.stamp_ns, to_cdr(health.report_array(named))
+
+    def may_be(self, name: str, item: Input) -> bool:
+        """Whether an input is that of a node, whose name may have come after its messages.
+
+        Where the middleware tells nobody apart, it may be anybody's.
+        """
+        owner = item.owner
+        if not owner.name and owner.gid:
+            return peers.publishers(self, item.topic).get(owner.gid) == name
+        return owner.name in (name, '')
 
     def keep(self, item: Input, raw: bytes, info: dict) -> None:
         """Keep a message until its tick is complete.
