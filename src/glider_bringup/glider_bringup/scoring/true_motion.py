@@ -64,16 +64,20 @@ class TrueMotion:
     def __init__(self) -> None:
         self._target: np.ndarray | None = None
         self._course = 0.0
+        self._rows = np.empty((0, 0))  #: used again: new memory takes longer than the copy
 
     def of(self, log: np.ndarray) -> np.ndarray:
         """Log rows, float64[n, ROW], with true odometry and cross-track error.
 
         ``log`` are the next rows; they are not changed, and given back if the odometry is the
-        truth.
+        truth. Else what is given holds until the next call.
         """
         if not len(log) or np.isnan(log[0, _TRUTH_START]) or _is_truth(log):
             return log
-        true = log.copy()
+        if len(log) > len(self._rows):
+            self._rows = np.empty_like(log)
+        true = self._rows[: len(log)]
+        true[:] = log
         true[:, _ODOM] = log[:, _TRUTH_START : _TRUTH_START + _NUMBERS]
         course = self._course_of_target(log)
         east, north = (true[:, i] - log[:, i] for i in (_ODOM_START, _ODOM_START + 1))
