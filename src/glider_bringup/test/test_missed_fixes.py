@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from glider_base.frames import poses_from_wire
-from glider_base.signals import TICK_S
+from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_guidance.yo.stage import WAITING_ON_SURFACE
 from glider_mission.blocks import COLUMNS
+from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.scenario import load_scenario
+from glider_navigation.block import NAVIGATION
 from glider_navigation.phase import FIXED
 
 DURATION_S = 259200.0
@@ -153,3 +155,30 @@ def test_covariance_grows_from_one_missed_fix_to_the_next_and_comes_back(flown):
     assert np.all(flown.jumps.variance[:, 1] < 0.05 * flown.jumps.variance[:, 0])
     # a jump lies within what it said of itself: chi squared of two numbers, 95 %
     assert np.mean(flown.jumps.place**2 < 5.991 / 2.0 * flown.jumps.variance[:, 0]) > 0.85
+
+
+def test_a_driver_that_says_its_last_fix_again_under_water_misleads_nobody():
+    """Until it has another one: as receivers do that are asked for where they are."""
+    ways = {'dives': 3, 'duration_s': 20000.0, 'profile.surface_every_dives': 1}
+    at_once = {'navigation.method': 'dead_reckoned', 'profile.depth_m': 150.0}
+    scenario = load_scenario('current_8deg', {**ways, **at_once})
+    log = np.concatenate([block.copy() for block in fly_blocks(*mission_of(scenario))])
+    inputs = {name: log[:, COLUMNS[name]] for name in NAVIGATION.wired.inputs}
+    fix = inputs['fix']
+    is_fix = fix[:, 0] >= 0.0
+    last = np.maximum.accumulate(np.where(is_fix, np.arange(len(fix)), -1))
+    again = np.where(last[:, np.newaxis] < 0, fix, fix[last])
+    assert np.count_nonzero(again[:, 0] >= 0.0) > 2 * np.count_nonzero(is_fix)
+    stamps_ns = np.arange(len(log)) * TICK_NS
+    settings = scenario.navigation_settings()
+    places = []
+    for said in (fix, again):
+        outputs, flags = RecordedBlock(NAVIGATION, settings).run(
+            stamps_ns, {**inputs, 'fix': said}
+        )
+        places.append(np.ascontiguousarray(outputs['odom'][:, :3]))
+        assert not np.any(flags[:, 1])
+    assert np.array_equal(places[0], log[:, COLUMNS['odom']][:, :3])
+    off = np.abs(places[1] - places[0])
+    assert np.max(off[:, 2]) < 0.05
+    assert np.max(np.hypot(off[:, 0], off[:, 1])) < 10.0

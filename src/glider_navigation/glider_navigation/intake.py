@@ -5,7 +5,8 @@
 A sensor that shows nothing that can be believed for longer than ``hold_s`` and a sampling period
 is lost. Without attitude or depth there is no odometry: what is published then has no attitude (a
 quaternion of zeros), which nobody after navigation takes for one, and the guard brings the
-vehicle up. Whether a fix lies where the vehicle can be is for the method to say.
+vehicle up. Whether a fix lies where the vehicle can be is for the method to say. A driver may go
+on with its last fix as long as it has no other one, under water too: that is none.
 """
 
 import math
@@ -29,6 +30,10 @@ from glider_navigation.method import Fix, Heard
 
 #: A refusal is told for so long (s), lest every sample of a sensor that fails is an event.
 REFUSAL_SHOWN_S = 2.0
+#: A fix that is the same to the last digit though the vehicle went down so far (m) is an old one.
+REPEATED_M = 1.0
+#: No fix.
+_NO_FIX = Fix(False, 0.0, 0.0, 0.0)
 #: Deeper or higher than this no sensor shows (m).
 DEPTH_MAX_M = 12000.0
 
@@ -52,6 +57,9 @@ class IntakeState(NamedTuple):
     imu_s: float = 0.0
     depth: float = 0.0
     depth_s: float = 0.0
+    fix: Fix = _NO_FIX  #: the last that was heard, or none
+    fix_depth: float = 0.0  #: the least there was since then (m)
+    fix_is_old: bool = False  #: it has gone down with it
     seen: bool = False  #: there has been an attitude
     sounded: bool = False  #: there has been a depth
     refused_s: float = REFUSAL_SHOWN_S  #: since something was refused
@@ -98,9 +106,16 @@ def take_in(
         depth_s, sounded = 0.0, True
     else:
         depth, refused = state.depth, refused or params.reads_attitude
-    fix = heard.fix
+    fix, said = heard.fix, state.fix
     if fix.is_fix and not _is_fix(fix):
-        fix, refused = Fix(False, 0.0, 0.0, 0.0), True
+        fix, refused = _NO_FIX, True
+    fix_depth, fix_is_old = depth, False
+    if fix.is_fix and said.is_fix and fix.p_n == said.p_n and fix.p_e == said.p_e:
+        fix_depth = min(depth, state.fix_depth)
+        fix_is_old = state.fix_is_old or depth > fix_depth + REPEATED_M
+    said = fix
+    if fix_is_old:
+        fix = _NO_FIX
     altitude = heard.altitude if math.isfinite(heard.altitude) else 0.0
     refused_s = 0.0 if refused else state.refused_s + dt
     taken = Heard(
@@ -119,6 +134,9 @@ def take_in(
         imu_s=imu_s,
         depth=depth,
         depth_s=depth_s,
+        fix=said,
+        fix_depth=fix_depth,
+        fix_is_old=fix_is_old,
         seen=seen,
         sounded=sounded,
         refused_s=refused_s,
