@@ -121,8 +121,9 @@ def test_killed_node_is_named(fly, name, number):
 
 
 def test_nodes_that_are_killed_together_are_all_named(fly):
-    at = time.time() + 1.0
-    die = python(f'import os, time; time.sleep({at} - time.time()); os.kill(os.getpid(), 9)')
+    at = time.time() + 2.0
+    wait = f'time.sleep(max(0.0, {at} - time.time()))'
+    die = python(f'import os, time; {wait}; os.kill(os.getpid(), 9)')
     result, _ = fly({'guidance_node': die, RECORDER: recorder(), PLANT: node(), 'guard_node': die})
     killed = ('guidance_node', 'guard_node')
     assert result.reason == '; '.join(f'{name} was killed by SIGKILL' for name in killed)
