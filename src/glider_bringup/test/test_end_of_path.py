@@ -341,6 +341,27 @@ def test_who_comes_up_far_from_its_last_point_flies_on_to_it(tmp_path):
     assert done.exit_code == 0 and json.loads(done.stdout)['identical'], done.output
 
 
+@pytest.mark.parametrize(
+    ('end_m', 'radius_m', 'speed_kn'), [(100.0, 40.0, 0.3), (300.0, 20.0, 0.2)]
+)
+def test_who_comes_up_beside_its_last_point_dives_again_however_near_it_is(
+    end_m, radius_m, speed_kn
+):
+    """It is too near for a dive that is worth it, and not near enough: an order led nowhere."""
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0], [end_m, 0]], 'arrival_radius_m': radius_m}
+    changes = {'dives': 0, 'duration_s': 8000.0, 'path': path, 'profile.depth_m': 40.0}
+    changes |= {'current.speed_kn': speed_kn, 'current.direction_deg': 90.0}
+    changes |= {'navigation.method': 'dead_reckoned', 'profile.surface_every_dives': 20}
+    run = glider.fly('current_8deg', changes)
+    assert run.score['arrival']['arrived'] and run.score['arrival']['missed_m'] < radius_m
+    data = run.to_xarray()
+    before, after = data.stage.values[:-1], data.stage.values[1:]
+    dives = np.flatnonzero((before != 1) & (after == 1))
+    depth_m = data.ground_truth_odom_depth.values
+    deepest_m = [float(part.max()) for part in np.split(depth_m, dives)[1:]]
+    assert len(deepest_m) > 1 and min(deepest_m) > 8.0
+
+
 @pytest.mark.parametrize('method', ['known', 'dead_reckoned'])
 def test_who_has_come_up_at_its_last_point_has_arrived_though_it_drifts_on(method, tmp_path):
     """The current carries it out of the radius before the run is over. Over nodes too."""

@@ -231,13 +231,14 @@ def _start(state, odometry, s, params):
 def _change_path(state, s, params):
     """State at the first tick of another path, at its ``s`` (m).
 
-    Who was at the end dives on, if dives are left.
+    Who was at the end dives on, if dives are left, however near the other end is.
     """
     profile = state.profile
     if profile.stage == AT_END_OF_PATH:
         done = 0 < params.profile.dives <= profile.dives
         stage = WAITING_ON_SURFACE if done else SURFACE_PREPARATION
-        profile = replace(profile, stage=stage, ticks=0, turn_depth=params.profile.depth)
+        depth, begun = params.profile.depth, profile.dives
+        profile = replace(profile, stage=stage, ticks=0, turn_depth=depth, begun=begun)
     elif is_descending(profile.stage):
         profile = replace(profile, turn_depth=params.profile.depth)
     progress = on_another_path(state.progress, state.tick, s, params.no_progress_surfacings)

@@ -344,7 +344,7 @@ def test_the_last_dives_take_up_the_way_that_is_left(top, share, is_up, above, l
     turn = top + (0.5 + 0.5 * share) * (200.0 - top)
     way = 4.0 * (turn - top) + (2.0 * top if is_up else depth)
     left = WayLeft(way / params.glide_rate + 4.0 * lead_s * drift, drift)
-    assert next_dive(left, depth, is_up, lead_s, 3, params) == pytest.approx(turn)
+    assert next_dive(left, depth, is_up, lead_s, 3, False, params) == pytest.approx(turn)
 
 
 def test_the_last_of_so_many_dives_is_left_out_where_the_path_ends_before_it():

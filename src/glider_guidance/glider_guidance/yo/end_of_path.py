@@ -65,12 +65,13 @@ def shallowest_dive(params):
 
 
 @kernel
-def next_dive(left, depth, surfaced, lead_s, dives, params):
+def next_dive(left, depth, surfaced, lead_s, dives, is_first, params):
     """Depth (m) of the lower turn of the dive to come, so that the last one ends with the path.
 
     0.0 if no dive is to come. ``depth`` (m) is where the vehicle is: rising to the upper
     turn, or at the surface, if the dive begins there (``surfaced``). ``lead_s`` (s) is the
-    lead of a turn, ``dives`` were begun so far.
+    lead of a turn, ``dives`` were begun so far. The first of a path is flown, however near its
+    end is.
     """
     if math.isinf(left.glide_s):
         return params.depth
@@ -94,9 +95,9 @@ def next_dive(left, depth, surfaced, lead_s, dives, params):
     planned = top + 0.5 * rate * (made_good_s - turns_s)
     shallowest = shallowest_dive(params)
     # nor is a dive worth it that mostly makes up for what its turns lose to the current
-    worth_it = shallowest if dives == 0 else min(params.depth, top + LEAST_DIVE_M)
+    worth_it = shallowest if is_first else min(params.depth, top + LEAST_DIVE_M)
     if planned < max(shallowest, worth_it) or made_good_s < -turns_s:
-        return shallowest if dives == 0 else 0.0
+        return shallowest if is_first else 0.0
     return params.depth if count == 1.0 else planned
 
 

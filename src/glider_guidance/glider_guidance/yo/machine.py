@@ -158,6 +158,7 @@ class ProfileState(NamedTuple):
     #: Planned lower turn of this dive, or of the next; 0: none is to come (m).
     turn_depth: float = math.inf
     depth: float = math.inf  #: of a dive, when that was planned (m)
+    begun: int = 0  #: dives before those of the path that began at the end of the one before
 
 
 #: Of a mission that does not end with its path.
@@ -168,12 +169,11 @@ NO_END = WayLeft(math.inf, 0.0)
 def _planned_turn(state, depth, left, params):
     """Lower turn (m) of this dive as it was planned, or of the next as it would be now."""
     stage = state.stage
+    lead_s, dives = turn_lead_s(state, params), state.dives
     if stage == GLIDING_UP:
-        return next_dive(
-            left, depth, depth < AT_SURFACE_M, turn_lead_s(state, params), state.dives + 1, params
-        )
+        return next_dive(left, depth, depth < AT_SURFACE_M, lead_s, dives + 1, False, params)
     if stage == SURFACE_PREPARATION or stage == WAITING_ON_SURFACE:
-        return next_dive(left, depth, True, turn_lead_s(state, params), state.dives, params)
+        return next_dive(left, depth, True, lead_s, dives, dives == state.begun, params)
     return state.turn_depth
 
 
