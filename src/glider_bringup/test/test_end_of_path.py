@@ -18,6 +18,7 @@ from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.showing.scorecard import card_rows
+from glider_guidance.yo.stage import AT_END_OF_PATH, GLIDING_DOWN
 from glider_mission.planned import planned_ticks
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario, scenario_names
@@ -324,7 +325,7 @@ def test_who_comes_up_far_from_its_last_point_flies_on_to_it(tmp_path):
     assert whole.score['arrival']['arrived'] and whole.score['arrival']['missed_m'] < 40.0
     assert whole.score['status'] == 'completed'
     data = whole.to_xarray()
-    up = np.flatnonzero(np.diff((data.stage.values == 7).astype(int)) == 1)
+    up = np.flatnonzero(np.diff((data.stage.values == AT_END_OF_PATH).astype(int)) == 1)
     assert len(up) > 1 and data.ground_truth_odom_east.values[up[0]] > 40.0
     changes['duration_s'] = 0.1 * (up[0] + 1500)
     runs = [
@@ -356,7 +357,7 @@ def test_who_comes_up_beside_its_last_point_dives_again_however_near_it_is(
     assert run.score['arrival']['arrived'] and run.score['arrival']['missed_m'] < radius_m
     data = run.to_xarray()
     before, after = data.stage.values[:-1], data.stage.values[1:]
-    dives = np.flatnonzero((before != 1) & (after == 1))
+    dives = np.flatnonzero((before != GLIDING_DOWN) & (after == GLIDING_DOWN))
     depth_m = data.ground_truth_odom_depth.values
     deepest_m = [float(part.max()) for part in np.split(depth_m, dives)[1:]]
     assert len(deepest_m) > 1 and min(deepest_m) > 8.0
@@ -376,7 +377,7 @@ def test_who_has_come_up_at_its_last_point_has_arrived_though_it_drifts_on(metho
         for engine in ('direct', 'nodes')
     ]
     data = runs[0].to_xarray()
-    at_end = data.stage.values == 7
+    at_end = data.stage.values == AT_END_OF_PATH
     assert np.count_nonzero(np.diff(at_end.astype(int))) == 1 and at_end[-1]
     assert data.ground_truth_odom_north.values[-1] > 360.0
     flown = [run.to_xarray().ground_truth_odom_north.values.tobytes() for run in runs]

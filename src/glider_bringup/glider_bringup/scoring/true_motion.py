@@ -64,7 +64,7 @@ class TrueMotion:
     def __init__(self) -> None:
         self._target: np.ndarray | None = None
         self._course = 0.0
-        self._rows = np.empty((0, 0))  #: used again: new memory takes longer than the copy
+        self._rows = np.empty((0, 0))  #: of the last block, used again
 
     def of(self, log: np.ndarray) -> np.ndarray:
         """Log rows, float64[n, ROW], with true odometry and cross-track error.
