@@ -429,6 +429,13 @@ def test_a_pitch_that_freezes_over_fast_ground_does_not_freeze_the_depth():
     assert flown.depth[-1] < AT_SURFACE_M
 
 
+def test_who_is_fouled_until_it_hangs_in_its_dive_comes_up():
+    """It stalled, rose and stalled again, and went 10 m deeper in 2,500 s, for three days."""
+    growth = broken('fouling', drag=10.0, lift=0.3, over_s=5000.0)
+    flown = fly('slocum_shelf', 7000.0, [growth])
+    assert flown.depth.max() > 80.0 and flown.depth[-1] < AT_SURFACE_M
+
+
 def test_way_over_ground_that_a_tilt_shows_as_way_up_is_none():
     """It believed to rise as it was asked to, and sank out of its yo."""
     yo = {'profile.depth_m': 20.0, 'profile.top_depth_m': 3.0, 'profile.pitch_deg': 16.9}

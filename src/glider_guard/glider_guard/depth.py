@@ -21,6 +21,8 @@ MEAN_S = 10.0
 #: A depth that changes by no more than this (m), or than this share of the way down by pump and
 #: pitch, rests.
 AT_REST_M, AT_REST_SHARE = 1.0, 0.25
+#: A vehicle that is asked down goes deeper by so many times what is the same depth, or stalls.
+DEEPER = 4.0
 #: For longer than this (s) the depth lags behind the vertical rate before it is told.
 LAG_S = 10.0
 #: The past of the lag fades with this time (s).
@@ -75,6 +77,8 @@ class Depths(NamedTuple):
     top: float  #: the least that this has been while it stayed the same (m)
     bottom: float  #: and the most
     stalled_s: float
+    low: float  #: depth from which progress downward is counted (m)
+    dives_s: float  #: time without progress while it is asked down
     rest: float  #: depth at which it may be at rest (m)
     led_m: float  #: way by pump and pitch meanwhile (m, + down)
     up_s: float  #: time under water since it surfaces for good
@@ -89,7 +93,7 @@ class Depths(NamedTuple):
     apart_s: float  #: for which two measured depths have differed
 
 
-INITIAL_DEPTHS = Depths(*(25 * (0.0,)))
+INITIAL_DEPTHS = Depths(*(27 * (0.0,)))
 
 
 class Sounding(NamedTuple):
@@ -153,6 +157,7 @@ def begin_at(depth):
         near=depth,
         top=depth,
         bottom=depth,
+        low=depth,
         rest=depth,
         up_from=depth,
         least=depth,
@@ -184,6 +189,11 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
     if progress:
         mark = depth
     mean, before = state.mean + dt / MEAN_S * (depth - state.mean), state.least
+    dives = under and at.target > depth and not at.surfaces
+    low = min(state.low, depth) if dives else depth
+    is_slow = dives and depth - low < DEEPER * limits.stalled_m
+    if not is_slow:
+        low = depth
     near = state.near + dt / limits.stall_mean_s * (depth - state.near)
     if abs(depth - state.depth) > limits.jump_m:  # it was set anew
         mean, near, before = depth, depth, depth
@@ -215,6 +225,8 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
         top=top,
         bottom=bottom,
         stalled_s=_count(is_stalled, state.stalled_s, dt),
+        low=low,
+        dives_s=_count(is_slow, state.dives_s, dt),
         rest=rest,
         led_m=led_m,
         up_s=_count(waits_up, state.up_s, dt),
@@ -250,7 +262,7 @@ def depth_rows(state, surfaces, sees, floods, limits):
     reported |= row(rows.NEAR_BOTTOM, state.bottom_s > limits.altitude_s)
     reported |= row(rows.NOT_CLIMBING, state.climbs_s > limits.no_climb_s)
     reported |= row(rows.NOT_RISING, surfaces and _weight_goes(state, sees, floods, limits))
-    reported |= row(rows.STALLED, state.stalled_s > limits.stalled_s)
+    reported |= row(rows.STALLED, max(state.stalled_s, state.dives_s) > limits.stalled_s)
     reported |= row(rows.UNDER_LONG, state.under_s > limits.under_water_s)
     reported |= row(rows.FROZEN, state.lag_s > LAG_S or state.still_s > limits.still_s)
     reported |= row(rows.FROZEN, not surfaces and abs(state.led_m) > limits.led_m)

@@ -125,9 +125,10 @@ ROWS = (
     Row(
         STALLED,
         'stalled',
-        'under water at the same depth',
+        'under water at the same depth, or asked down and deeper by less than four times as much '
+        'in that time',
         'stalled_m, stalled_s',
-        'stays at one depth',
+        'stays at one depth, or hardly goes down',
     ),
     Row(
         UNDER_LONG,

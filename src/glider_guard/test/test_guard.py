@@ -389,7 +389,19 @@ def test_who_moves_by_more_than_a_few_metres_does_not_stand_still(swing_m, told)
     """A yo of a minute by a pump that is too slow for it; one that hangs may swing, too."""
     vehicle, now, turns = Vehicle(depth_m=20.0), 0, 2.0 * math.pi / 60.0
     for second in range(2400):
-        now |= vehicle.go(1.0, rate=0.5 * swing_m * turns * math.cos(turns * second))
+        rate = 0.5 * swing_m * turns * math.cos(turns * second)
+        vehicle.target = 100.0 if rate > 0.0 else 0.0
+        now |= vehicle.go(1.0, rate=rate)
+    assert bool(now & rows.STALLED) == told
+
+
+@pytest.mark.parametrize(('sinks_mps', 'told'), [(0.009, True), (0.013, False)])
+def test_who_is_asked_down_and_only_swings_hardly_deeper_stalls(sinks_mps, told):
+    """By 4 m in 7 minutes, as one that stalls and is brought out of it again and again."""
+    vehicle, now, turns = Vehicle(depth_m=20.0), 0, 2.0 * math.pi / 420.0
+    vehicle.target = 200.0
+    for second in range(4000):
+        now |= vehicle.go(1.0, rate=sinks_mps + 2.0 * turns * math.cos(turns * second))
     assert bool(now & rows.STALLED) == told
 
 
