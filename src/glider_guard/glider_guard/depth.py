@@ -21,8 +21,8 @@ MEAN_S = 10.0
 #: A depth that changes by no more than this (m), or than this share of the way down by pump and
 #: pitch, rests.
 AT_REST_M, AT_REST_SHARE = 1.0, 0.25
-#: A vehicle that is asked down goes deeper by so many times what is the same depth, or stalls.
-DEEPER = 4.0
+#: One that is asked down goes farther than this many times the same depth, or hangs. It may swing.
+FARTHER = 4.0
 #: For longer than this (s) the depth lags behind the vertical rate before it is told.
 LAG_S = 10.0
 #: The past of the lag fades with this time (s).
@@ -77,8 +77,8 @@ class Depths(NamedTuple):
     top: float  #: the least that this has been while it stayed the same (m)
     bottom: float  #: and the most
     stalled_s: float
-    low: float  #: depth from which progress downward is counted (m)
-    dives_s: float  #: time without progress while it is asked down
+    hangs: float  #: depth near which it may hang while it is asked down (m)
+    hangs_s: float
     rest: float  #: depth at which it may be at rest (m)
     led_m: float  #: way by pump and pitch meanwhile (m, + down)
     up_s: float  #: time under water since it surfaces for good
@@ -157,7 +157,7 @@ def begin_at(depth):
         near=depth,
         top=depth,
         bottom=depth,
-        low=depth,
+        hangs=depth,
         rest=depth,
         up_from=depth,
         least=depth,
@@ -190,10 +190,8 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
         mark = depth
     mean, before = state.mean + dt / MEAN_S * (depth - state.mean), state.least
     dives = under and at.target > depth and not at.surfaces
-    low = min(state.low, depth) if dives else depth
-    is_slow = dives and depth - low < DEEPER * limits.stalled_m
-    if not is_slow:
-        low = depth
+    is_held = dives and abs(depth - state.hangs) < FARTHER * limits.stalled_m
+    hangs = state.hangs if is_held else depth
     near = state.near + dt / limits.stall_mean_s * (depth - state.near)
     if abs(depth - state.depth) > limits.jump_m:  # it was set anew
         mean, near, before = depth, depth, depth
@@ -225,8 +223,8 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
         top=top,
         bottom=bottom,
         stalled_s=_count(is_stalled, state.stalled_s, dt),
-        low=low,
-        dives_s=_count(is_slow, state.dives_s, dt),
+        hangs=hangs,
+        hangs_s=_count(is_held, state.hangs_s, dt),
         rest=rest,
         led_m=led_m,
         up_s=_count(waits_up, state.up_s, dt),
@@ -262,7 +260,7 @@ def depth_rows(state, surfaces, sees, floods, limits):
     reported |= row(rows.NEAR_BOTTOM, state.bottom_s > limits.altitude_s)
     reported |= row(rows.NOT_CLIMBING, state.climbs_s > limits.no_climb_s)
     reported |= row(rows.NOT_RISING, surfaces and _weight_goes(state, sees, floods, limits))
-    reported |= row(rows.STALLED, max(state.stalled_s, state.dives_s) > limits.stalled_s)
+    reported |= row(rows.STALLED, max(state.stalled_s, state.hangs_s) > limits.stalled_s)
     reported |= row(rows.UNDER_LONG, state.under_s > limits.under_water_s)
     reported |= row(rows.FROZEN, state.lag_s > LAG_S or state.still_s > limits.still_s)
     reported |= row(rows.FROZEN, not surfaces and abs(state.led_m) > limits.led_m)

@@ -125,10 +125,9 @@ ROWS = (
     Row(
         STALLED,
         'stalled',
-        'under water at the same depth, or asked down and deeper by less than four times as much '
-        'in that time',
+        'under water at the same depth; if it is asked down, give or take four times as much',
         'stalled_m, stalled_s',
-        'stays at one depth, or hardly goes down',
+        'stays at one depth',
     ),
     Row(
         UNDER_LONG,

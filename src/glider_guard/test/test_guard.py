@@ -396,7 +396,7 @@ def test_who_moves_by_more_than_a_few_metres_does_not_stand_still(swing_m, told)
 
 
 @pytest.mark.parametrize(('sinks_mps', 'told'), [(0.009, True), (0.013, False)])
-def test_who_is_asked_down_and_only_swings_hardly_deeper_stalls(sinks_mps, told):
+def test_who_is_asked_down_and_swings_near_one_depth_stalls(sinks_mps, told):
     """By 4 m in 7 minutes, as one that stalls and is brought out of it again and again."""
     vehicle, now, turns = Vehicle(depth_m=20.0), 0, 2.0 * math.pi / 420.0
     vehicle.target = 200.0
