@@ -20,18 +20,21 @@ from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 import glider_bringup as glider
+from glider_base import wiring
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
+from glider_mission.blocks import BLOCKS
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.node_settings import read_settings
-from glider_mission.recording.ros.recorded_run import Recording
+from glider_mission.recording.ros.recorded_run import Recording, Series
 from glider_mission.recording.ros.verify.check import IDENTICAL
 from glider_mission.recording.ros.verify.every_block import report, verify
+from glider_mission.recording.ros.verify.free_running import free_running
 from glider_mission.recording.ros.verify.lockstep import place_ticks
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
@@ -345,6 +348,39 @@ def test_a_vehicle_whose_clock_is_set_back_is_verified(altered, beginning, tmp_p
     for block in report['blocks'][2:5]:
         assert block['ticks'] == 400
         assert set(block['differing']) <= {'path', '/diagnostics'}, block
+
+
+class Sums(RecordedBlock):
+    """Sums what joint_states say, as an integral does, and shows the sum at every fifth step."""
+
+    def run(self, stamps_ns, inputs, passed):
+        sums = self.state + np.cumsum(inputs['joint_states'][:, 0])
+        self.state = float(sums[-1])
+        demand = np.outer(np.where(stamps_ns // TICK_NS % 5 == 0, sums, 0.0), np.ones(4))
+        return {'demand': demand}, np.zeros((len(demand), len(self.block.flags)), np.int64)
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_an_input_that_shows_only_some_steps_later_is_found_by_trying(short_run, tmp_path, seed):
+    """It is late by up to two ticks, as free-running. The likely one is the wrong one here."""
+    draw, bag = np.random.default_rng(seed), Bag(short_run)
+    recording = Recording(bag, None, lambda share: None)
+    (control,) = (one for one in BLOCKS if one.wired == wiring.CONTROL)
+    settings = read_settings(bag, short_run, None, tmp_path).blocks['control']
+    newest, series = np.arange(3, 103), recording.series
+    series['joint_states'].values[:, 0] = draw.integers(0, 2, len(series['joint_states']))
+    heard = np.maximum.accumulate(newest - draw.integers(0, 3, len(newest)))
+    block, again = Sums(control, settings), Sums(control, settings)
+    block.state = again.state = 0.0
+    joints = {'joint_states': series['joint_states'].values[heard]}
+    said, _ = block.run(newest * TICK_NS, joints, None)
+    one = series['demand'] = Series(series['demand'].codec)
+    one.stamps_ns, one.values = newest * TICK_NS, said['demand']
+    one.own, one._count = np.ones(len(newest), bool), len(newest)
+    del series['wrench'], series['adaptation']
+    recording.events = []
+    found = free_running(again, recording, 1.0, lambda share: None)
+    assert (found.ticks, found.compared['demand'], found.differing) == (100, 100, {})
 
 
 @pytest.mark.parametrize('keep', [False, True])

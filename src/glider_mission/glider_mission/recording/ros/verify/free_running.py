@@ -7,6 +7,7 @@ from copy import copy
 
 import numpy as np
 
+from glider_base.kernels.packing import packed
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.health import seconds
 from glider_base.ros.lockstep.step_node import Passing
@@ -19,6 +20,9 @@ from glider_mission.recording.ros.verify.check import Check, Track, Verdict
 _OLDER = range(4)
 #: Behind a clock that was set back a step is looked for so many messages ahead.
 _AHEAD = 1024
+#: Where no message fits, one before was taken wrongly: so many steps are taken again, or so many,
+#: and in each of them so many ways are followed.
+_BACK, _WAYS = (4, 16), 64
 #: An input goes on by one message from step to step, or by one of these.
 _ADVANCES = (1, 0, 2)
 #: What comes in every tick is missed after so long (s); answers, which may come late, later.
@@ -62,23 +66,31 @@ def free_running(
     check.passed[:] = [passing.ticks(int(stamp_ns)) for stamp_ns in stamps_ns]
     outputs = check.tracks(lambda one: _by_stamp(one, stamps_ns), 'which belongs to no step')
     start, cuts = 0, check.cuts(len(stamps_ns))
-    last = None
+    taken = {name: np.full(len(stamps_ns), -1) for name in block.inputs}
+    marks = []  # steps since an order, and the states before them
     while start < len(stamps_ns):
-        choices = {}
-        for name in block.inputs:
-            before = last and last[name]
-            newest = _newest(series[name].stamps_ns, stamps_ns[start], before or 0)
-            choices[name] = _places(newest, before)
+        if start in cuts:
+            marks = []
         check.follow_orders(start)
+        marks = [*marks[-_BACK[-1] :], (start, block.state)]
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])
-        rows, good = _closest(check, start, end, _options(choices), outputs)
+        rows, computed, good = _closest(check, start, end, taken, outputs)
+        if not good and (found := _otherwise(check, start, marks, taken, outputs)):
+            rows, computed, good = found
+        if not rows:
+            wanted = f'{" and ".join(block.inputs)} of this step'
+            check.add_whole(stamps_ns[start], next(iter(outputs)), wanted)
+        for name, values in computed.items():
+            check.compare(name, outputs[name], start, values)
         if not good:
             break
+        for name, index in rows.items():
+            taken[name][start : start + good] = index
         start += good
-        last = {name: int(index[good - 1]) for name, index in rows.items()}
         progress(start / len(stamps_ns))
     if check.found:
-        check.notes.append('free-running: compared up to the first difference')
+        if start < len(stamps_ns):
+            check.notes.append('free-running: compared up to the first difference')
         at_ns = min(one.stamp_ns for one in check.found)
         check.notes += [
             f'{name} is not on record from {seconds(begin_ns)} to {seconds(end_ns)}: if the '
@@ -130,11 +142,24 @@ def _places(newest: int, last: int | None) -> list[int]:
     return [place for place in dict.fromkeys(likely) if place >= last]
 
 
-def _options(choices: dict[str, list[int]]) -> list[dict[str, int]]:
-    """Choices of one message of each input, the likely ones first."""
+def _options(check: Check, step: int, before: dict[str, int] | None) -> list[dict[str, int]]:
+    """Choices of one message of each input of a step, the likely ones first.
+
+    ``before`` are those of the step before; None at the first one.
+    """
+    choices = {}
+    for name in check.block.inputs:
+        last = before and before[name]
+        stamps_ns = check.recording.series[name].stamps_ns
+        choices[name] = _places(_newest(stamps_ns, check.stamps_ns[step], last or 0), last)
     ranked = itertools.product(*(enumerate(places) for places in choices.values()))
     in_order = sorted(ranked, key=lambda option: sum(rank for rank, _ in option))
     return [dict(zip(choices, (place for _, place in one), strict=True)) for one in in_order]
+
+
+def _before(taken: dict[str, np.ndarray], step: int) -> dict[str, int] | None:
+    """Messages of the inputs that the step before had; None at the first one."""
+    return {name: int(index[step - 1]) for name, index in taken.items()} if step else None
 
 
 def _consecutive(check: Check, start: int, end: int, begin: dict[str, int]):
@@ -154,15 +179,16 @@ def _consecutive(check: Check, start: int, end: int, begin: dict[str, int]):
     return {name: index[:count] for name, index in rows.items()}
 
 
-def _closest(check: Check, start: int, end: int, options, outputs):
-    """Compare by that of the options for the inputs of a step that gives most of its outputs.
+def _closest(check: Check, start: int, end: int, taken, outputs):
+    """Find the option for the inputs of a step that gives most of its outputs.
 
-    Returns the messages of the inputs, and how many steps from ``start`` on are identical. The
-    block is left after them; if there are none, what differs is kept.
+    Returns the messages of the inputs and what is computed of them, as long as that is identical,
+    and how many steps from ``start`` on are. If none is, it is that of the first one. The block is
+    left after them.
     """
     before, least = check.block.state, np.inf
     rows, computed, good, count = {}, {}, 0, 0
-    for begin in options:
+    for begin in _options(check, start, _before(taken, start)):
         tried = _consecutive(check, start, end, begin)
         if not (steps := min(map(len, tried.values()))):
             continue
@@ -174,14 +200,51 @@ def _closest(check: Check, start: int, end: int, options, outputs):
             good = int(np.argmax(np.append(np.any(wrong, axis=0), True)))
         if good:
             break
-    if not rows:
-        wanted = f'{" and ".join(check.block.inputs)} of this step'
-        check.add_whole(check.stamps_ns[start], next(iter(outputs)), wanted)
-        return rows, 0
     steps = max(1, good)
+    rows = {name: index[:steps] for name, index in rows.items()}
     if good < count:
         check.block.state = before
-        check.run(start, start + steps, {name: index[:steps] for name, index in rows.items()})
-    for name, track in outputs.items():
-        check.compare(name, track, start, computed[name][:steps])
-    return rows, good
+        check.run(start, start + steps, rows)
+    return rows, {name: computed[name][:steps] for name in outputs if rows}, good
+
+
+def _otherwise(check: Check, at: int, marks, taken, outputs):
+    """Find other messages for some steps before one that none fits, so that one does.
+
+    Returns what `_closest` does, or None. ``taken`` is put right for the steps before, and
+    ``marks`` are kept where it has not changed.
+    """
+    for back in _BACK:
+        begin = max(at - back, marks[0][0])
+        first, check.block.state = next(one for one in reversed(marks) if one[0] <= begin)
+        if first < begin:
+            check.run(first, begin, {name: index[first:begin] for name, index in taken.items()})
+        begun = check.block.state
+        ways = [(begun, [])]
+        for step in range(begin, at + 1):
+            more = {}
+            for state, way in ways:
+                for option in _options(check, step, way[-1] if way else _before(taken, step)):
+                    rows = _consecutive(check, step, step + 1, option)
+                    if not min(map(len, rows.values())):
+                        continue
+                    check.block.state = state
+                    found = check.run(step, step + 1, rows)
+                    if any(check.differs(outputs[name], step, found[name]) for name in outputs):
+                        continue
+                    _, numbers, others = packed(check.block.state)
+                    bits = tuple(np.asarray(one).tobytes() for one in (*numbers, *others))
+                    # of those that come to the same the oldest leave most to choose from
+                    if bits not in more or sum(option.values()) < sum(more[bits][1][-1].values()):
+                        more[bits] = check.block.state, [*way, option]
+            ways = [*more.values()][:_WAYS]
+        if ways:
+            for name, index in taken.items():
+                index[begin : at + 1] = [option[name] for option in ways[0][1]]
+            marks[:] = [one for one in marks if one[0] <= begin]
+            check.block.state = begun
+            rows = {name: index[begin : at + 1] for name, index in taken.items()}
+            found = check.run(begin, at + 1, rows)
+            rows = {name: index[-1:] for name, index in rows.items()}
+            return rows, {name: found[name][-1:] for name in outputs}, 1
+    return None
