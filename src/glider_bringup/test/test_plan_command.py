@@ -14,6 +14,7 @@ from glider_base.frames import poses_from_wire
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_bringup.cli import app
+from glider_bringup.commands import plan as planning
 from glider_bringup.commands.plan import plan
 from glider_bringup.engines.flight import fly
 from glider_bringup.engines.recorded import fly_recorded
@@ -102,9 +103,11 @@ def test_a_plan_tells_time_and_energy_of_a_flight_that_surfaces_and_of_one_that_
     yo |= {'profile.wait_s': wait_s, 'profile.clearance_m': 10.0, 'water.bottom_m': bottom_m}
     known = {'navigation.method': 'known', 'dives': 0, 'duration_s': 2e5}
     scenario = load_scenario('slocum_shelf', {'path': path, **yo, **known})
-    made, flown = planned(scenario), glider.fly(scenario).score
-    assert made.arrival_s(50.0) == pytest.approx(flown['arrival']['t_s'], rel=0.15)
-    assert made.wh == pytest.approx(flown['energy']['wh'], rel=0.15)
+    made, run = planned(scenario), glider.fly(scenario)
+    assert made.arrival_s(50.0) == pytest.approx(run.score['arrival']['t_s'], rel=0.15)
+    assert made.wh == pytest.approx(run.score['energy']['wh'], rel=0.15)
+    surfacings = np.sum(np.diff(run.to_xarray().ground_truth_odom_depth.values < 1.5) > 0) // 2
+    assert planning._report(made, scenario)['surfacings'] == pytest.approx(surfacings, rel=0.15)
 
 
 @pytest.mark.parametrize(

@@ -58,7 +58,11 @@ def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
     """What a plan says, for machines."""
     origin = scenario.origin.params()
     corners = [to_geodetic(*map(float, corner), origin) for corner in made.route.corners]
-    time_s = made.arrival_s(50.0)
+    time_s, cycles = made.arrival_s(50.0), math.inf
+    if scenario.profile.surface_every_dives:
+        cycles = time_s / made.pace.cycle_s
+    elif math.isfinite(time_s):  # it comes up at the end alone
+        cycles = float(scenario.path.at_end == 'stop')
     return {
         'scenario': scenario.name,
         'changed': scenario.changed,
@@ -69,7 +73,7 @@ def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
         'mission_h': made.end_s / 3600.0,
         'dives': scenario.dives if made.end_s < scenario.duration_s else None,
         'wh': made.wh,
-        'surfacings': math.ceil(time_s / made.pace.cycle_s) if math.isfinite(time_s) else None,
+        'surfacings': math.ceil(cycles) if math.isfinite(cycles) else None,
         'speed_mps': made.pace.speed,
         'notes': _notes(made, scenario),
         'route_latlon': [list(one) for one in corners],
