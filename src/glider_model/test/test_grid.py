@@ -89,7 +89,7 @@ def grid(path, *places, **more):
 @pytest.mark.parametrize('engine', ['h5netcdf', 'scipy'])
 def test_water_is_what_xarray_makes_of_it(layout, packed, engine, tmp_path):
     """At 10,000 places, depths and times; also held above the first and below the last level."""
-    order = (0, 1, 2, 3) if packed else (3, 0, 2, 1)
+    order = (0, 1, 2, 3) if packed and engine == 'h5netcdf' else (3, 0, 2, 1)
     path = written(dataset(layout, order=order), tmp_path / 'sea.nc', packed, engine=engine)
     params = grid(path, (35.0, 121.0), (37.0, 123.0))
     rng = np.random.default_rng(3)

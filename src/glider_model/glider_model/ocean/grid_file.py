@@ -525,7 +525,8 @@ def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.nd
         if len(pieces) > 1:
             pieces = [xarray.concat([piece.load() for piece in pieces], dimension)]
         (part,) = pieces
-    return np.asarray(part.transpose(*axes.values()).values, dtype=float)
+    # read first: of packed NetCDF 3 xarray transposes nothing that it has not read
+    return np.asarray(part.load().transpose(*axes.values()).values, dtype=float)
 
 
 def _fill_land(levels: np.ndarray) -> np.ndarray:
