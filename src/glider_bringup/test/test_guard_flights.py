@@ -473,3 +473,11 @@ def test_a_pump_that_chases_what_sensors_err_by_is_no_fault():
     flown = fly('spline', 4000.0, seed=1818021652, sensors=errs, **yo)
     assert flown.depth.max() > 900.0
     assert flown.first(rows.STUCK_BUOYANCY) == np.inf
+
+
+def test_a_depth_that_moves_is_not_told_to_stand_still_alone():
+    """It lost 0.85 kg in its dive, and rose by 10 m in a minute."""
+    flown = fly('current_8deg', 900.0, [broken('mass', mass_kg=-0.85, at_s=500.0)])
+    at = round(flown.first(rows.FROZEN) / TICK_S)
+    assert flown.depth[at - 600] - flown.depth[at] > 5.0
+    assert 'goes elsewhere' in rows.say(int(flown.told[at]))

@@ -13,6 +13,7 @@ import command_line
 from glider_base.signals import TICK_S
 from glider_bringup.scoring.card import STATUSES, fly_scored
 from glider_bringup.scoring.score import Scorer
+from glider_bringup.showing.scorecard import event_texts
 from glider_guard.rows import CRUSHING, LEAK, NOT_RISING, STUCK_ROLL
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.rules import Rules
@@ -282,6 +283,16 @@ def test_battery_of_a_mission_that_ended_lasts_for_nothing(guard):
 def test_no_weight_is_dropped_by_a_vehicle_that_has_none(vehicle, reaction):
     guard = scores(DIVE, from_s(1500.0, NOT_RISING), vehicle=vehicle)['guard']
     assert guard['reaction'] == guard['events'][0]['reaction'] == reaction
+
+
+def test_what_ended_the_mission_is_told_however_often_something_else_was_before():
+    """A row that comes and goes 200 times, then a leak."""
+    guard = np.where(np.floor(T / 5.0) % 2, STUCK_ROLL, 0) | from_s(2000.0, LEAK)
+    told = scores(DIVE, guard)
+    assert [one['row'] for one in told['guard']['events']].count('leak') == 1
+    often, leak = event_texts(told, 'guard')
+    assert often.endswith('(100 times or more)')
+    assert leak == 'at 2,000.0 s: surface: there is water in the hull'
 
 
 @pytest.mark.parametrize('speed', [0.5, 0.0, -0.67])

@@ -142,8 +142,8 @@ ROWS = (
         'the measured depth does not go where the vertical rate, or pump and pitch, lead, shows '
         'the same to the last bit, or nothing measured moves',
         'lag_share, lag_m, led_m, still_s',
-        'the measured depth, or all that is measured, stands still, or the vehicle lies aground '
-        'or on denser water',
+        'the measured depth stands still, or goes elsewhere than pump and pitch lead, or the '
+        'vehicle lies aground or on denser water',
     ),
     Row(
         DEPTH_OFFSET,

@@ -8,6 +8,7 @@ believes.
 """
 
 import math
+from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ from glider_bringup.scoring.outcome import (
     outcome_of,
     way_to_end,
 )
-from glider_bringup.scoring.scores import Flown, measured, seconds
+from glider_bringup.scoring.scores import EVENTS_KEPT, Flown, measured, seconds
 from glider_bringup.scoring.true_motion import TrueMotion, course_at, jumps
 from glider_control.intake import REFUSED
 from glider_guard.rows import ALL, DROP, LATCHED, NOTE, REACTIONS, ROWS, SURFACE, reaction_of
@@ -59,8 +60,6 @@ INFEASIBLE_SHARE = 0.5
 
 #: The course of the path is told by so much of it (m).
 COURSE_M = 1.0
-#: So many events of the guard, or of guidance, are kept.
-EVENTS_KEPT = 100
 #: What the event of a refused measurement says.
 REFUSED_SAYS = 'a measurement was refused, the last good one serves'
 
@@ -414,19 +413,20 @@ def _guard(mask: np.ndarray, has_weight: bool) -> dict:
     rows = {row.bit: (row.name, REACTIONS[min(row.reaction, gravest)], row.says) for row in ROWS}
     rows[REFUSED] = ('measurement_refused', REACTIONS[NOTE], REFUSED_SAYS)
     reported = as_reported(mask.astype(np.int64) & (ALL | REFUSED))
-    events, before = [], 0
+    events, before, count = [], 0, Counter()
     for tick in np.flatnonzero(np.diff(reported, prepend=0)).tolist():
         new = int(reported[tick]) & ~before
         before = int(reported[tick])
         events += [
             {'t_s': seconds(tick), 'row': row, 'reaction': reaction, 'message': says}
             for bit, (row, reaction, says) in rows.items()
-            if new & bit
+            if new & bit and count[bit] < EVENTS_KEPT
         ]
+        count.update(bit for bit in rows if new & bit)
     return {
         'state': 'latched' if before & LATCHED else 'flying',
         'reaction': REACTIONS[min(reaction_of(before), gravest)],
-        'events': events[:EVENTS_KEPT],
+        'events': events,
     }
 
 

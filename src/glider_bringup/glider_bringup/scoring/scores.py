@@ -14,6 +14,9 @@ import numpy as np
 from glider_base.signals import TICK_S
 from glider_model.ocean.current_settings import KNOT_MPS
 
+#: So many events of each row of the guard, and of no progress, are kept: the first ones.
+EVENTS_KEPT = 100
+
 
 class Flown(NamedTuple):
     """What scores are made from: arrays over the ticks of a run."""

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from glider_bringup.console import messages, output
 from glider_bringup.scoring.card import STATUSES, STOPPED
-from glider_bringup.scoring.scores import SCORES, Score, reckoned, scores_in
+from glider_bringup.scoring.scores import EVENTS_KEPT, SCORES, Score, reckoned, scores_in
 from glider_bringup.showing.words import span, way
 from glider_mission.changes import fields_text
 from glider_mission.chart import place_text
@@ -182,8 +182,9 @@ def event_texts(card: dict, part: str) -> list[str]:
             text = f'{reaction}: {text}'
         first.setdefault(text, event['t_s'])
         count[text] += 1
+    times = {1: '', EVENTS_KEPT: f' ({EVENTS_KEPT} times or more)'}
     return [
-        f'at {t_s:,.1f} s: {text}' + (f' ({count[text]} times)' if count[text] > 1 else '')
+        f'at {t_s:,.1f} s: {text}' + times.get(count[text], f' ({count[text]} times)')
         for text, t_s in first.items()
     ]
 
