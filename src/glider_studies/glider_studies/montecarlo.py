@@ -31,9 +31,12 @@ from glider_model.vehicle.perturb import (
     PerturbSettings,
     perturbed,
 )
+from glider_model.vehicle.surface import surface_loads
 from glider_studies.random_faults import sample_faults, validated
 from glider_studies.workers import Pool, Progress
 
+#: Sideslip by which the moment of a steering surface is told (rad).
+SLIP = 1e-6
 #: What a plant differs by: uniformly, by at most so much.
 COEFFICIENT_SPREAD, ADDED_MASS_SPREAD = 0.3, 0.15
 PITCH_TRIM_M, ROLL_BIAS_DEG, NET_HEAVINESS_KG = 0.010, 10.0, 0.050
@@ -125,13 +128,14 @@ def sample_plant(seed: int, vehicle: VehicleParams, reckons: bool = False) -> di
 def airframe(vehicle: VehicleParams, plant: VehicleParams) -> dict[str, Any]:
     """Whether a plant can be flown at all, beside the ``vehicle`` as its file says.
 
-    ``pitch_moment_kg`` and ``yaw_moment_kg``: static moment per angle and V^2 with the Munk moment
-    (stable: < 0 and > 0). ``steering_dive`` and ``steering_climb``: turn rate over sin(roll)
-    relative to that of the file (None: no steady glide, or no roll). What follows: ``unstable``,
-    ``weak_steering``.
+    ``pitch_moment_kg`` and ``yaw_moment_kg``: static moment per angle and V^2, with the Munk
+    moment and that of a steering surface (stable: < 0 and > 0). ``steering_dive`` and
+    ``steering_climb``: turn rate over sin(roll) relative to that of the file (None: no steady
+    glide, or no roll). What follows: ``unstable``, ``weak_steering``.
     """
     pitch = plant.K_M + plant.a_33 - plant.a_11
-    yaw = plant.K_MY - plant.a_22 + plant.a_11
+    loads = surface_loads((0.0,) * 6, 1.0, SLIP, 0.0, 0.0, 0.0, 0.0, 0.0, plant.surface)
+    yaw = plant.K_MY - plant.a_22 + plant.a_11 + loads[5] / SLIP
     steering = {}
     for phase, sign in (('steering_dive', 1.0), ('steering_climb', -1.0)):
         nominal, actual = _turn_rate_over_roll(vehicle, sign), _turn_rate_over_roll(plant, sign)

@@ -155,6 +155,14 @@ def test_nominal_airframe_is_stable_and_steers(vehicle):
     assert not frame['unstable'] and not frame['weak_steering']
 
 
+def test_a_slocum_is_stable_by_its_fin():
+    slocum = load_vehicle('slocum_g2').params()
+    frame = airframe(slocum, slocum)
+    fin = 0.5 * 1025.0 * 0.02 * 2.5 * 0.75  # rho/2 S a x, by its file
+    assert frame['yaw_moment_kg'] == pytest.approx(33.0 - 64.4 + 14.0 + fin, abs=0.01)
+    assert not frame['unstable']
+
+
 @pytest.mark.parametrize(
     ('change', 'flag'),
     [({'K_M': 0.5}, 'unstable'), ({'K_MY': 0.45}, 'unstable'), ({'K_MY': 0.65}, 'weak_steering')],
