@@ -6,12 +6,11 @@ import math
 
 import numpy as np
 
-from glider_base.kernel import kernel
 from glider_mission.blocks import COLUMNS
 
 _TRUTH_START, _ODOM_START = (COLUMNS[name].start for name in ('ground_truth/odom', 'odom'))
-_NUMBERS = 13  #: of an odometry, without its covariance
-_ODOM = slice(_ODOM_START, _ODOM_START + _NUMBERS)
+#: Numbers of an odometry, without its covariance.
+_TRUTH, _ODOM = (slice(start, start + 13) for start in (_TRUTH_START, _ODOM_START))
 _E1, _E2 = COLUMNS['tracking_error'].start, COLUMNS['tracking_error'].start + 1
 #: Of the virtual target.
 _EAST, _NORTH = COLUMNS['reference'].start, COLUMNS['reference'].start + 1
@@ -22,19 +21,10 @@ JUMP_M = 3.0
 _AWAY_M = 1.0
 
 
-@kernel
-def _mark_jumps(target, before, is_jump):
-    east, north = before[0], before[1]
-    for row in range(len(target)):
-        is_jump[row] = math.hypot(target[row, 0] - east, target[row, 1] - north) > JUMP_M
-        east, north = target[row, 0], target[row, 1]
-
-
 def jumps(target: np.ndarray, before: np.ndarray) -> np.ndarray:
     """Rows in which the virtual target, float64[n, 2], is on another path than a row earlier."""
-    is_jump = np.empty(len(target), np.bool_)
-    _mark_jumps(target, before, is_jump)
-    return np.flatnonzero(is_jump)
+    moved_m = np.hypot(*np.diff(target, axis=0, prepend=before[np.newaxis]).T)
+    return np.flatnonzero(moved_m > JUMP_M)
 
 
 def course_at(row: np.ndarray) -> float | None:
@@ -43,16 +33,6 @@ def course_at(row: np.ndarray) -> float | None:
     if math.hypot(east, north) <= _AWAY_M:
         return None
     return math.atan2(east, north) - math.atan2(row[_E2], row[_E1])
-
-
-@kernel
-def _is_truth(log):
-    """Whether the odometry of log rows is the truth, to the last bit."""
-    for row in range(len(log)):
-        for i in range(_NUMBERS):
-            if log[row, _ODOM_START + i] != log[row, _TRUTH_START + i]:
-                return False
-    return True
 
 
 class TrueMotion:
@@ -72,13 +52,15 @@ class TrueMotion:
         ``log`` are the next rows; they are not changed, and given back if the odometry is the
         truth. Else what is given holds until the next call.
         """
-        if not len(log) or np.isnan(log[0, _TRUTH_START]) or _is_truth(log):
+        if not len(log) or np.isnan(log[0, _TRUTH_START]):
+            return log
+        if np.array_equal(log[:, _ODOM], log[:, _TRUTH]):
             return log
         if len(log) > len(self._rows):
             self._rows = np.empty_like(log)
         true = self._rows[: len(log)]
         true[:] = log
-        true[:, _ODOM] = log[:, _TRUTH_START : _TRUTH_START + _NUMBERS]
+        true[:, _ODOM] = log[:, _TRUTH]
         course = self._course_of_target(log)
         east, north = (true[:, i] - log[:, i] for i in (_ODOM_START, _ODOM_START + 1))
         true[:, _E2] += np.cos(course) * east - np.sin(course) * north
