@@ -282,6 +282,10 @@ def test_end_of_the_path_is_told_from_where_the_vehicle_came_up():
     log[:, COLUMNS['ground_truth/odom'].start + 1] += 150.0  # beyond, and not at the surface
     past = score(log, path=path, ends=True)['arrival']
     assert (past['left_m'], past['eta_s']) == (0.0, pytest.approx(100.0, abs=0.2))
+    far = score(log, path=path, ends=True, arrival_radius_m=40.0, glide_s=100.0)['arrival']
+    pace_s = 100.0 / 450.0
+    assert far['left_m'] == far['missed_m'] == pytest.approx(math.hypot(50.0, 4.0))
+    assert far['eta_s'] == pytest.approx(100.0 + far['left_m'] * pace_s, abs=0.2)
     log[:, COLUMNS['ground_truth/odom'].start + 1] -= 150.0
     log[t > 50.0, COLUMNS['stage']] = AT_END_OF_PATH
     assert score(log, path=path, ends=False)['arrival'] is None

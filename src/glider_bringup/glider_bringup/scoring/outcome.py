@@ -138,9 +138,12 @@ def arrival_of(
         back_n, back_e = targets[-1] - place
         behind_m = float(d_n * back_n + d_e * back_e) / math.hypot(d_n, d_e)
         ways, made_m = rules.path.ways, come_m - behind_m - began_m
-        left_m = float(max(0.0, ways[-1] - np.interp(come_m, rules.path.knots, ways) + behind_m))
+        # who is abeam of its end, or beyond, and not near enough has to come back
+        least_m = 0.0 if rules.has_arrived(missed_m) else missed_m
+        way_m = ways[-1] - float(np.interp(come_m, rules.path.knots, ways)) + behind_m
+        left_m = max(least_m, way_m)
         pace_s = (t_s - seconds(since)) / made_m if made_m >= LEAST_SHARE * length else None
-        eta_s = None if pace_s is None else t_s + max(0.0, length - come_m + behind_m) * pace_s
+        eta_s = None if pace_s is None else t_s + max(least_m, length - come_m + behind_m) * pace_s
     return {
         'arrived': is_at_end and rules.has_arrived(missed_m),
         't_s': t_s if is_at_end else None,
