@@ -60,13 +60,8 @@ def chosen_fields(
     A duration is simulated time (s), or that of the whole scenario: full; by default its dives.
     Raises ConfigurationError with its ``option`` if it is none.
     """
-    fields = dict(changes)
-    if controller is not None:
-        fields['control.law'] = controller
-    if guidance is not None:
-        fields['guidance.los.method'] = guidance
-    if seed is not None:
-        fields['seed'] = seed
+    chosen = {'control.law': controller, 'guidance.los.method': guidance, 'seed': seed}
+    fields = changes | {name: value for name, value in chosen.items() if value is not None}
     if duration is not None:
         fields['dives'] = 0
         if duration != 'full':
