@@ -3,6 +3,7 @@
 """Runs side by side: their scores, what their scenarios differ in, and one page over the other."""
 
 import math
+from collections.abc import Callable
 from itertools import compress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -135,27 +136,24 @@ def _cells(score: Score, cards: list[dict[str, Any]]) -> list[Cell]:
     return cells
 
 
+#: What is told of a run before its scores, and what of one that has none of it.
+_TOLD: dict[str, tuple[Callable[[dict], str], str]] = {
+    'status': (lambda card: ': '.join(filter(None, (card['status'], card['reason']))), ''),
+    'flown': (flown_text, ''),
+    'engine': (engine_text, ''),
+    'changed': (lambda card: fields_text(card.get('changed', {})), 'nothing'),
+    'navigation': (lambda card: (reckoned(card) or {'method': ''})['method'], 'known'),
+    'guard': (lambda card: '; '.join(event_texts(card, 'guard')), 'nothing'),
+}
+
+
 def score_rows(cards: list[dict[str, Any]]) -> list[tuple[str, list[Cell]]]:
     """Lines of scorecards side by side: name, then a cell of each run."""
-
-    def line(name: str, say) -> tuple[str, list[Cell]]:
-        return name, [Cell(say(card)) for card in cards]
-
-    rows = [
-        line('status', lambda card: ': '.join(filter(None, (card['status'], card['reason'])))),
-        line('flown', flown_text),
-        line('engine', engine_text),
-    ]
-    if any(card.get('changed') for card in cards):
-        rows.append(
-            line('changed', lambda card: fields_text(card.get('changed', {})) or 'nothing')
-        )
-    if any(map(reckoned, cards)):
-        rows.append(
-            line('navigation', lambda card: (reckoned(card) or {'method': 'known'})['method'])
-        )
-    if any(event_texts(card, 'guard') for card in cards):
-        rows.append(line('guard', lambda card: '; '.join(event_texts(card, 'guard')) or 'nothing'))
+    rows = []
+    for name, (say, without) in _TOLD.items():
+        texts = [say(card) for card in cards]
+        if any(texts):
+            rows.append((name, [Cell(text or without) for text in texts]))
     return rows + [
         (score.label, _cells(score, cards))
         for score in scores_in(cards)
