@@ -237,6 +237,23 @@ def test_what_no_slocum_flies_is_not_written(flown, tmp_path, changes, named):
     assert not (tmp_path / 'mafiles').exists()
 
 
+def test_the_mission_of_a_slocum_has_what_was_ordered_at_its_start(flown, tmp_path):
+    """Such as a planned route; what is ordered later no file says."""
+    route = {'kind': 'waypoints', 'waypoints': [[0.0, 0.0], [500.0, 0.0], [700.0, 900.0]]}
+    orders = [{'at_s': 0.0, 'path': route, 'depth_m': 50.0}]
+    run = read_run(flown.folder, traced=False)
+    write_mafiles(run._replace(scenario=load_scenario('survey', {'orders': orders})), tmp_path)
+    files = {'profile.mafiles': [str(tmp_path / 'yo10.ma')]}
+    files['path'] = {'kind': 'waypoints', 'waypoints_latlon': str(tmp_path / 'goto_l10.ma')}
+    read = load_scenario('survey', files)
+    assert np.allclose(np.ptp(read.path.points(0), axis=0), [700.0, 900.0, 0.0], atol=0.5)
+    assert read.profile.depth_m == 50.0
+    orders.append({'at_s': 900.0, 'depth_m': 80.0})
+    later = run._replace(scenario=load_scenario('survey', {'orders': orders}))
+    with pytest.raises(ConfigurationError, match=r'orders.1: .*at_s = 0'):
+        write_mafiles(later, tmp_path / 'later')
+
+
 def test_netcdf_of_a_run_with_a_date_has_times_by_cf(export):
     file = export('netcdf')
     with xarray.open_dataset(file, decode_times=False) as read:

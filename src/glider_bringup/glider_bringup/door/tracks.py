@@ -20,6 +20,7 @@ from glider_base.frames import OriginSettings, to_geodetic
 from glider_base.signals import TICK_S
 from glider_bringup.scoring.scores import reckoned
 from glider_bringup.showing.web_page import FlownRun
+from glider_guidance.orders import changed
 from glider_mission.disk import not_written, write_whole
 from glider_mission.mafiles import mafiles
 from glider_mission.scenario import Scenario
@@ -245,11 +246,20 @@ CHARTS = {'geojson': geojson, 'kml': kml, 'gpx': gpx}
 def write_mafiles(flown: FlownRun, folder: Path) -> None:
     """Write the mission of a run into a folder, as files of a Slocum's.
 
-    Raises ConfigurationError if its path has no waypoints or it follows a path in three
-    dimensions, or the files cannot be written.
+    Orders at its start are a part of it, such as a planned route. Raises ConfigurationError if
+    there are later ones, its path has no waypoints, it follows a path in three dimensions, or the
+    files cannot be written.
     """
     scenario = flown.scenario
-    path, profile, origin = scenario.path, scenario.profile, scenario.origin.params()
+    told, origin = scenario.guidance_settings(), scenario.origin.params()
+    for number, order in enumerate(scenario.orders):
+        if order.tick > 1 or order.abort or order.hold:
+            raise ConfigurationError(
+                f'{flown.label}: orders.{number}: files of a Slocum have no orders (allowed: those '
+                'of a path or a profile at_s = 0)'
+            )
+        told = changed(told, order)
+    path, profile = told.path, told.profile
     if path.kind != 'waypoints':
         raise ConfigurationError(
             f'{flown.label}: path.kind = {path.kind}: has no waypoints (allowed: waypoints)'
