@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steady glides and spirals against published numbers, and as fixed points of the plant."""
 
+import json
 import math
+from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -204,6 +206,14 @@ def test_a_glide_tail_first_does_not_count():
 def test_a_glide_on_its_back_does_not_count():
     """Mass aft of what any dive needs: the equations hold only with the nose past the vertical."""
     assert not solve_trim(ZHANG, 0.4, pitch_mass_m=-0.06).converged
+
+
+@pytest.mark.parametrize('m_b', [-0.3, 0.3])
+def test_a_glide_that_is_not_found_is_told_in_json(m_b):
+    glide = solve_trim(SEAWING, m_b, pitch_deg=-math.copysign(66.0, m_b), roll_mass_deg=40.0)
+    tail_first = solve_trim(SEAWING, m_b, pitch_deg=math.copysign(20.0, m_b))
+    told = [json.loads(json.dumps(asdict(one)))['converged'] for one in (glide, tail_first)]
+    assert told == [False, False]
 
 
 def test_a_pitch_out_of_the_mass_reach_does_not_count():

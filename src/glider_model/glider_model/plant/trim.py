@@ -142,7 +142,7 @@ def _follow_branch(z: np.ndarray, glide: _Glide) -> tuple[np.ndarray, bool]:
         z = root(_residual, z, args=(share, glide), method='hybr', tol=1e-13).x
         upright = abs(_unpack(z, glide)[3]) < 0.5 * math.pi and abs(z[4]) < 0.5 * math.pi
         small = np.max(np.abs(_residual(z, share, glide))) < 1e-9
-        solved = upright and z[0] > 0.0 and bool(small)
+        solved = bool(upright and z[0] > 0.0 and small)
         if not solved:
             break
     return z, solved
