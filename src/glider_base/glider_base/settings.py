@@ -240,6 +240,14 @@ def leaves(values: dict[str, Any], before: str = '') -> Iterator[tuple[str, Any]
             yield f'{before}{name}', value
 
 
+def nested(values: dict[str, Any]) -> dict[str, Any]:
+    """Nested mappings of values by their dotted names; errors as `holder_of`."""
+    tree: dict[str, Any] = {}
+    for name, value in values.items():
+        holder_of(tree, name)[name.rpartition('.')[2]] = value
+    return tree
+
+
 def unit_of(field: pydantic.fields.FieldInfo) -> str:
     """Unit of a field, from the first brackets of its description; empty without."""
     brackets = re.search(r'\(((?:[^()]|\([^()]*\))+)\)', field.description or '')

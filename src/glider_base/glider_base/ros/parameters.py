@@ -27,7 +27,7 @@ from rclpy.parameter import Parameter
 
 from glider_base.errors import ConfigurationError, clipped, shown
 from glider_base.files import parse_json, parse_yaml
-from glider_base.settings import Settings, holder_of, limits, mistakes, validate
+from glider_base.settings import Settings, limits, mistakes, nested, validate
 
 SettingsT = TypeVar('SettingsT', bound=Settings)
 
@@ -142,18 +142,11 @@ def _parse(leaf: _Leaf, value, source: str):
     raise ConfigurationError(f'{source} {leaf.name} = {shown(value)}: {why}')
 
 
-def _nested(values: dict[str, Any]) -> dict[str, Any]:
-    tree: dict[str, Any] = {}
-    for name, value in values.items():
-        holder_of(tree, name)[name.rpartition('.')[2]] = value
-    return tree
-
-
 def _validated(node: Node, model: type[SettingsT], leaves, values: dict[str, Any]) -> SettingsT:
     source = f'{node.get_name()}: parameter'
     tree = {leaf.name: _parse(leaf, values[leaf.name], source) for leaf in leaves}
     try:
-        settings = model.model_validate(_nested(tree))
+        settings = model.model_validate(nested(tree))
         settings.check()
         return settings
     except pydantic.ValidationError as error:
@@ -220,7 +213,7 @@ def unknown_parameters(node: Node, names: Iterable[str]) -> str:
 
 def to_parameters(settings: Settings) -> dict[str, Any]:
     """Nested parameters that `declare_settings` turns back into equal ``settings``."""
-    return _nested(
+    return nested(
         {
             leaf.name: leaf.default if leaf.kind else _text(leaf.field, leaf.default)
             for leaf in _leaves(type(settings), settings)
@@ -244,7 +237,7 @@ def with_parameters(settings: SettingsT, values: dict[str, str]) -> SettingsT:
         given = {name: json.loads(text) for name, text in values.items()}
     except (ValueError, RecursionError):
         raise ConfigurationError(f'parameters {shown(values)}: not JSON') from None
-    return validate(type(settings), _nested({**kept, **given}), 'parameter')
+    return validate(type(settings), nested({**kept, **given}), 'parameter')
 
 
 def from_parameters(model: type[SettingsT], values: dict[str, Any], source: str) -> SettingsT:
@@ -259,7 +252,7 @@ def from_parameters(model: type[SettingsT], values: dict[str, Any], source: str)
             branch = branch.get(part, _MISSING) if isinstance(branch, dict) else _MISSING
         if branch is not _MISSING:
             tree[leaf.name] = _parse(leaf, branch, f'{source}:')
-    return validate(model, _nested(tree), source)
+    return validate(model, nested(tree), source)
 
 
 class _ParameterDumper(yaml.SafeDumper):

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from glider_base.settings import nested
 from glider_base.signals import TICK_S
 from glider_model.ocean.current_settings import KNOT_MPS
 
@@ -173,12 +174,4 @@ def scores_in(cards: list[dict[str, Any]]) -> list[Score]:
 
 def measured(flown: Flown, only: str = '') -> dict[str, Any]:
     """The part of ``score.json`` that is made from a flight: figures in their groups, or one."""
-    found: dict[str, Any] = {}
-    for one in SCORES:
-        if one.of and only in ('', one.group):
-            *groups, name = one.key.split('.')
-            into = found
-            for group in groups:
-                into = into.setdefault(group, {})
-            into[name] = one.of(flown)
-    return found
+    return nested({one.key: one.of(flown) for one in SCORES if one.of and only in ('', one.group)})
