@@ -160,7 +160,9 @@ def check_orders(
     for i, order in sorted(enumerate(orders), key=lambda one: one[1].tick):
         try:
             if is_aborted:
-                raise ConfigurationError('the mission is aborted before (allowed: nothing more)')
+                raise ConfigurationError(
+                    f'at_s = {order.at_s:g}: the mission is aborted before (allowed: nothing more)'
+                )
             settings, is_aborted = changed(settings, order), order.abort
         except ConfigurationError as error:
             raise ConfigurationError(f'{name.format(i)}{error}') from None
