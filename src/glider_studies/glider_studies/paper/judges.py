@@ -155,8 +155,7 @@ def judge_stays(rows: list[dict]) -> list[Check]:
         dac, error = row['navigation']['dac_error_mps']['worst'], _later(row)
         beside = short[row['dive_m']]
         most = None if beside is None else beside + STAY_MORE_M
-        passed = dac is not None and dac <= STAY_DAC_MPS
-        checks.append(Check(f'{row["case"]}: DAC error (m/s)', dac, STAY_DAC_MPS, passed))
+        checks.append(_at_most(f'{row["case"]}: DAC error (m/s)', dac, STAY_DAC_MPS))
         passed = error is not None and most is not None and error <= most
         checks.append(Check(f'{row["case"]}: error (m)', error, most, passed))
     return [*checks, *_not_ended(rows)]
