@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from glider_bringup.scoring.card import fly_scored
+from glider_bringup.showing.words import hours_of
 from glider_mission.choices import combination_of
 from glider_mission.routing.plan import plan
 from glider_mission.scenario import Scenario, load_scenario
@@ -65,17 +66,12 @@ def cross_one(task: tuple[int, float, str]) -> dict[str, Any]:
             sure = plan(scenario)
             return {
                 'reachable': sure.reachable,
-                'plan_h': _hours(sure.arrival_s(50.0)),
-                'plan_straight_h': _hours(sure.straight_s),
+                'plan_h': hours_of(sure.arrival_s(50.0)),
+                'plan_straight_h': hours_of(sure.straight_s),
             }
         _, scores = fly_scored(scenario)
     arrival = scores['arrival']
-    return {f'{way}_h': _hours(arrival['t_s'] if arrival['arrived'] else math.inf)}
-
-
-def _hours(time_s: float) -> float | None:
-    """A time in hours; None: not in the time of the mission."""
-    return time_s / 3600.0 if math.isfinite(time_s) else None
+    return {f'{way}_h': hours_of(arrival['t_s'] if arrival['arrived'] else math.inf)}
 
 
 def judge(rows: list[dict[str, Any]]) -> list[Check]:

@@ -11,7 +11,7 @@ import typer
 
 from glider_base.frames import to_geodetic
 from glider_bringup.console import Changes, Json, Named, changed_fields, counter, print_table
-from glider_bringup.showing.words import count, span
+from glider_bringup.showing.words import count, hours_of, span
 from glider_mission.chart import place_text
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
 
@@ -49,11 +49,6 @@ def plan(
         print_table(f'{planned.name}: {planned.described}', (), _rows(report))
 
 
-def _hours(seconds: float) -> float | None:
-    """Hours of a time; None of what never comes."""
-    return seconds / 3600.0 if math.isfinite(seconds) else None
-
-
 def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
     """What a plan says, for machines."""
     origin = scenario.origin.params()
@@ -67,9 +62,9 @@ def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
         'scenario': scenario.name,
         'changed': scenario.changed,
         'reachable': made.reachable,
-        'arrival_h': {f'p{p}': _hours(made.arrival_s(float(p))) for p in (10, 50, 90)},
-        'waypoints_h': [_hours(one) for one in made.waypoints_s],
-        'straight_h': _hours(made.straight_s),
+        'arrival_h': {f'p{p}': hours_of(made.arrival_s(float(p))) for p in (10, 50, 90)},
+        'waypoints_h': [hours_of(one) for one in made.waypoints_s],
+        'straight_h': hours_of(made.straight_s),
         'mission_h': made.end_s / 3600.0,
         'dives': scenario.dives if made.end_s < scenario.duration_s else None,
         'wh': made.wh,

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbers as a person says them."""
 
+import math
+
 
 def span(seconds: float) -> str:
     """Time as a person says it."""
@@ -12,6 +14,11 @@ def span(seconds: float) -> str:
         return f'{minutes} min'
     hours, minutes = divmod(minutes, 60)
     return f'{hours} h {minutes} min' if minutes else f'{hours} h'
+
+
+def hours_of(seconds: float) -> float | None:
+    """Hours of a time; None of what never comes."""
+    return seconds / 3600.0 if math.isfinite(seconds) else None
 
 
 def way(metres: float | None) -> str:
