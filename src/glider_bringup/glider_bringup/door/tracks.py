@@ -255,8 +255,8 @@ def write_mafiles(flown: FlownRun, folder: Path) -> None:
     for number, order in enumerate(scenario.orders):
         if order.tick > 1 or order.abort or order.hold:
             raise ConfigurationError(
-                f'{flown.label}: orders.{number}: files of a Slocum have no orders (allowed: those '
-                'of a path or a profile at_s = 0)'
+                f'{flown.label}: orders.{number}: files of a Slocum say no later orders (allowed: '
+                'those of a path or a profile, at_s = 0)'
             )
         told = changed(told, order)
     path, profile = told.path, told.profile
