@@ -187,6 +187,28 @@ def test_who_is_at_the_end_of_its_path_flies_the_next_one(at_s, when):
     assert (run.score['status'], run.score['arrival']['arrived']) == ('completed', True)
 
 
+@pytest.mark.parametrize('told', [{'hold': True}, {'abort': True}, {'resume': True}])
+def test_who_has_arrived_is_told_something_there_and_has_arrived(told):
+    short = {'kind': 'straight', 'length_m': 300.0}
+    orders = [{'at_s': 1050.0, 'hold': True}] if 'resume' in told else []
+    orders.append({'at_s': 1100.0, **told})
+    changes = {'path': short, 'current.speed_kn': 0.0, 'duration_s': 1300.0, 'orders': orders}
+    run = glider.fly('survey', {**changes, 'profile.surface_every_dives': 1})
+    up_s = 0.1 * np.argmax(run.to_xarray().stage.values == 7)
+    assert 0.0 < up_s < 1050.0 and run.score['sim_time_s'] == 1300.0
+    arrival = run.score['arrival']
+    assert (arrival['arrived'], arrival['t_s']) == (True, pytest.approx(up_s, abs=0.2))
+
+
+def test_a_run_that_is_over_before_another_path_is_ordered_is_unfinished():
+    short = {'kind': 'straight', 'length_m': 300.0}
+    changes = {'path': short, 'current.speed_kn': 0.0, 'duration_s': 9000.0}
+    for order, status in (({'path': EAST}, 'unfinished'), ({'depth_m': 50.0}, 'completed')):
+        told = glider.fly('survey', {**changes, 'orders': [{'at_s': 6000.0, **order}]}).score
+        assert told['arrival']['arrived'] and told['sim_time_s'] < 6000.0
+        assert (told['status'], '6,000 s' in told['reason']) == (status, status == 'unfinished')
+
+
 @pytest.mark.parametrize('start', [(-3.0, 5.0), (3.0, -5.0)])
 def test_a_box_is_flown_round_wherever_beside_its_start_it_begins(start):
     """On the one side its last leg is nearer than its first."""

@@ -44,7 +44,7 @@ from glider_guidance.block import say_no_progress
 from glider_guidance.order import Order
 from glider_guidance.orders import begins, first_ticks
 from glider_guidance.path.curve import PathParams, path_length, path_point
-from glider_guidance.yo.stage import AT_END_OF_PATH
+from glider_guidance.yo.stage import AT_END_OF_PATH, GLIDING_DOWN
 from glider_mission.blocks import COLUMNS
 from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario
@@ -193,11 +193,12 @@ class Scorer:
                 self._end, path_from = None, row
                 place = _place_of(log[row])
                 self._ordered.append((begin + row, place, order.path.params()))
-        away = np.flatnonzero(stage[path_from:] != AT_END_OF_PATH)
-        if len(away):  # who came up too far from it flies on
+        away = np.flatnonzero(stage[path_from:] == GLIDING_DOWN)
+        if len(away):  # who came up too far from it flies on; who holds there or aborts does not
             self._end, path_from = None, path_from + int(away[-1]) + 1
-        if self._end is None and path_from < len(log):
-            self._end = begin + path_from, log[path_from].copy()
+        up = path_from + np.flatnonzero(stage[path_from:] == AT_END_OF_PATH)
+        if self._end is None and len(up):
+            self._end = begin + int(up[0]), log[up[0]].copy()
 
     @property
     def ticks(self) -> int:
@@ -361,6 +362,9 @@ class Scorer:
             drifts = arrival and not ended and not 0 < rules.dives <= dives
             if rules.dives_at_all and drifts:
                 return 'afloat for longer than it was to wait, before the end of its path'
+            later_s = [one.at_s for one in self._waiting if one.path]
+            if later_s and min(later_s) < rules.duration_s and not 0 < rules.dives <= dives:
+                return f'over before another path was ordered, at {min(later_s):,.0f} s'
             return ''
         if dives < rules.dives:
             return f'dives flown, of those that there was time for: {dives} of {rules.dives}'
