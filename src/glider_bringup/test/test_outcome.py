@@ -158,12 +158,13 @@ def test_way_that_is_left_counts_that_the_vehicle_was_carried_back():
     assert told['arrival']['eta_s'] is None
 
 
-@pytest.mark.parametrize('dives', [0, 4])
-def test_a_mission_that_drifts_before_the_end_of_its_path_is_unfinished(dives):
+@pytest.mark.parametrize(('dives', 'at_end'), [(0, 'stop'), (4, 'stop'), (0, 'continue')])
+def test_a_mission_that_drifts_before_the_end_of_its_path_is_unfinished(dives, at_end):
     """Its depth shows 1.5 m at the surface, so it waits to come up, long before its time."""
     path = {'kind': 'waypoints', 'waypoints': [[0, 0], [3000, 0]], 'at_end': 'stop'}
     yo = {'profile.depth_m': 100.0, 'profile.surface_every_dives': 1, 'path': path}
-    changes = {**yo, 'dives': dives, 'sensors.depth_offset_m': 1.5}
+    orders = [{'at_s': 60.0, 'path': {**path, 'at_end': at_end}}]
+    changes = {**yo, 'dives': dives, 'sensors.depth_offset_m': 1.5, 'orders': orders}
     _, told = fly_scored(load_scenario('current_8deg', changes), [])
     assert (told['status'], told['dives']) == ('unfinished', 1)
     assert told['reason'].startswith('afloat')

@@ -359,7 +359,7 @@ class Scorer:
             return f'came up {arrival["missed_m"]:,.0f} m from the last point of its path'
         if rules.duration_s - time_s > TICK_S:
             # who has arrived, or is to go on, may be done before
-            drifts = arrival and not ended and not 0 < rules.dives <= dives
+            drifts = (arrival or self._ordered) and not ended and not 0 < rules.dives <= dives
             if rules.dives_at_all and drifts:
                 return 'afloat for longer than it was to wait, before the end of its path'
             later_s = [one.at_s for one in self._waiting if one.path]
