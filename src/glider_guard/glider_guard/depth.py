@@ -203,8 +203,10 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
     is_counted = at.surfaces and at.is_pumped and not at.is_out
     least = min(before, mean) if is_counted else mean
     at_rest_m = max(AT_REST_M, AT_REST_SHARE * at.sure * state.led_m)
-    is_gone = not under or abs(depth - state.rest) > at_rest_m
+    is_gone = at.is_out or under != (state.rest > SURFACE_M) or abs(depth - state.rest) > at_rest_m
     rest, led_m = (depth, 0.0) if is_gone else (state.rest, state.led_m + dt * at.led)
+    if not under:  # nothing leads it up from there
+        led_m = max(0.0, led_m)
     waits_up = at.surfaces and not at.is_afloat
     up_from = state.up_from if waits_up and state.up_s > 0.0 else depth
     is_near = 0.0 < at.altitude < limits.altitude_min_m and at.rate > -RISES_MPS

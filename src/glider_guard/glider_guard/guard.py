@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 from glider_base.frames import pitch_of, rotate_to_ned
-from glider_base.kernel import kernel
+from glider_base.kernel import kernel, replace
 from glider_base.signals import SURFACE_TARGET, Battery, Covariance, Health, Joints, Odometry
 from glider_guard import rows
 from glider_guard.actuators import INITIAL_FOLLOWERS, ActuatorLimits, Followers, follow
@@ -293,6 +293,8 @@ def guard_step(
     witness, wrong = watch(witness, shown, sees, params.witness, dt)
     at = _sounding(state, taken, before, heard, shown, witness, last, reported, params)
     depths = sound(depths, at, params.depth, dt)
+    if sees and not at.surfaces and at.depth <= SURFACE_M and depths.led_m > params.depth.led_m:
+        witness = replace(witness, depth=depths.led_m)  # it was led there, whatever is shown
     # without a depth, a leak alone is certain
     floods = (state.reported & (rows.LEAK | rows.TOO_HEAVY if sees else rows.LEAK)) != 0
     reported |= wrong | depth_rows(depths, at.surfaces, sees, floods, params.depth)

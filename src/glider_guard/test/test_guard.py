@@ -306,17 +306,26 @@ def test_the_same_sample_is_none(pressure):
 
 
 @pytest.mark.parametrize('share', [0.0, 0.05, 0.15])
-def test_heavy_and_nose_down_it_does_not_stay_at_one_depth(share):
-    """A sensor that shows 100 m, or a part of the way, and noise; level, the same is no alarm."""
-    for pitch_deg, told in ((-25.0, rows.FROZEN), (0.0, 0)):
-        vehicle = Vehicle()
+@pytest.mark.parametrize('shown_m', [100.0, 0.0])
+def test_heavy_and_nose_down_it_does_not_stay_at_one_depth(share, shown_m):
+    """A sensor that shows one depth, or a part of the way, and noise; level, that is no alarm.
+
+    At 0 m its port is blocked: it is where it was led to. With the antenna out it is afloat.
+    """
+    afloat = WELL._replace(contact_age_s=0.0)
+    for pitch_deg, health in ((-25.0, WELL), (0.0, WELL), (-25.0, afloat)):
+        vehicle = Vehicle(depth_m=shown_m)
         vehicle.go(1.0)
         vehicle.pitch_deg = pitch_deg
         rate = share * glide_vertical_rate(math.radians(-25.0), 0.4, vehicle.params.weight.polar)
-        for second in range(500):
-            vehicle.depth = 100.0 + rate * second + 0.1 * (second % 3)
-            now = vehicle.go(1.0, rate=rate)
-        assert now & rows.FROZEN == told
+        deepest = 0.0
+        for second in range(600):
+            vehicle.depth = shown_m + rate * second + 0.1 * (second % 3)
+            now = vehicle.go(1.0, rate=rate, health=health)
+            deepest = max(deepest, vehicle.state.witness.depth)
+        is_told = pitch_deg < 0.0 and health is WELL
+        assert bool(now & rows.FROZEN) == is_told
+        assert share > 0.0 or not is_told or deepest > vehicle.params.depth.led_m
 
 
 @pytest.mark.parametrize(
