@@ -430,7 +430,7 @@ def test_a_pitch_that_freezes_over_fast_ground_does_not_freeze_the_depth():
 
 
 def test_who_is_fouled_until_it_hangs_in_its_dive_comes_up():
-    """It stalled, rose and stalled again, and went 10 m deeper in 2,500 s, for three days."""
+    """It stalled, rose and stalled again, a little deeper each time, to the end of its run."""
     growth = broken('fouling', drag=10.0, lift=0.3, over_s=5000.0)
     flown = fly('slocum_shelf', 7000.0, [growth])
     assert flown.depth.max() > 80.0 and flown.depth[-1] < AT_SURFACE_M

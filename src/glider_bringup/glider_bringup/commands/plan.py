@@ -53,11 +53,11 @@ def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
     """What a plan says, for machines."""
     origin = scenario.origin.params()
     corners = [to_geodetic(*map(float, corner), origin) for corner in made.route.corners]
-    time_s, cycles = made.arrival_s(50.0), math.inf
-    if scenario.profile.surface_every_dives:
-        cycles = time_s / made.pace.cycle_s
-    elif math.isfinite(time_s):  # it comes up at the end alone
-        cycles = float(scenario.path.at_end == 'stop')
+    time_s, surfacings = made.arrival_s(50.0), None
+    if math.isfinite(time_s):
+        surfacings = math.ceil(time_s / made.pace.cycle_s)
+        if not scenario.profile.surface_every_dives:  # it comes up at the end alone
+            surfacings = int(scenario.path.at_end == 'stop')
     return {
         'scenario': scenario.name,
         'changed': scenario.changed,
@@ -68,7 +68,7 @@ def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
         'mission_h': made.end_s / 3600.0,
         'dives': scenario.dives if made.end_s < scenario.duration_s else None,
         'wh': made.wh,
-        'surfacings': math.ceil(cycles) if math.isfinite(cycles) else None,
+        'surfacings': surfacings,
         'speed_mps': made.pace.speed,
         'notes': _notes(made, scenario),
         'route_latlon': [list(one) for one in corners],

@@ -20,9 +20,9 @@ from glider_mission.recording.ros.verify.check import Check, Track, Verdict
 _OLDER = range(4)
 #: Behind a clock that was set back a step is looked for so many messages ahead.
 _AHEAD = 1024
-#: Where no message fits, one before was taken wrongly: so many steps are taken again, or so many,
-#: and in each of them so many ways are followed.
-_BACK, _WAYS = (4, 16), 64
+#: Where no message fits, one before was taken wrongly: so many steps are taken again, and in each
+#: of them so many ways are followed.
+_BACK, _WAYS = 16, 64
 #: An input goes on by one message from step to step, or by one of these.
 _ADVANCES = (1, 0, 2)
 #: What comes in every tick is missed after so long (s); answers, which may come late, later.
@@ -72,7 +72,7 @@ def free_running(
         if start in cuts:
             marks = []
         check.follow_orders(start)
-        marks = [*marks[-_BACK[-1] :], (start, block.state)]
+        marks = [*marks[-_BACK:], (start, block.state)]
         end = min([start + 1024, len(stamps_ns), *(cut for cut in cuts if cut > start)])
         rows, computed, good = _closest(check, start, end, taken, outputs)
         if not good and (found := _otherwise(check, start, marks, taken, outputs)):
@@ -214,37 +214,43 @@ def _otherwise(check: Check, at: int, marks, taken, outputs):
     Returns what `_closest` does, or None. ``taken`` is put right for the steps before, and
     ``marks`` are kept where it has not changed.
     """
-    for back in _BACK:
-        begin = max(at - back, marks[0][0])
-        first, check.block.state = next(one for one in reversed(marks) if one[0] <= begin)
-        if first < begin:
-            check.run(first, begin, {name: index[first:begin] for name, index in taken.items()})
-        begun = check.block.state
-        ways = [(begun, [])]
-        for step in range(begin, at + 1):
-            more = {}
-            for state, way in ways:
-                for option in _options(check, step, way[-1] if way else _before(taken, step)):
-                    rows = _consecutive(check, step, step + 1, option)
-                    if not min(map(len, rows.values())):
-                        continue
-                    check.block.state = state
-                    found = check.run(step, step + 1, rows)
-                    if any(check.differs(outputs[name], step, found[name]) for name in outputs):
-                        continue
-                    _, numbers, others = packed(check.block.state)
-                    bits = tuple(np.asarray(one).tobytes() for one in (*numbers, *others))
-                    # of those that come to the same the oldest leave most to choose from
-                    if bits not in more or sum(option.values()) < sum(more[bits][1][-1].values()):
-                        more[bits] = check.block.state, [*way, option]
-            ways = [*more.values()][:_WAYS]
-        if ways:
-            for name, index in taken.items():
-                index[begin : at + 1] = [option[name] for option in ways[0][1]]
-            marks[:] = [one for one in marks if one[0] <= begin]
-            check.block.state = begun
-            rows = {name: index[begin : at + 1] for name, index in taken.items()}
-            found = check.run(begin, at + 1, rows)
-            rows = {name: index[-1:] for name, index in rows.items()}
-            return rows, {name: found[name][-1:] for name in outputs}, 1
-    return None
+    begin = max(at - _BACK, marks[0][0])
+    first, check.block.state = next(one for one in reversed(marks) if one[0] <= begin)
+    if first < begin:
+        check.run(first, begin, {name: index[first:begin] for name, index in taken.items()})
+    begun = check.block.state
+    ways = [(begun, [_before(taken, begin)])]
+    for step in range(begin, at + 1):
+        ways = _ways_on(check, step, ways, outputs)
+    if not ways:
+        return None
+    for name, index in taken.items():
+        index[begin : at + 1] = [option[name] for option in ways[0][1][1:]]
+    marks[:] = [one for one in marks if one[0] <= begin]
+    check.block.state = begun
+    rows = {name: index[begin : at + 1] for name, index in taken.items()}
+    found = check.run(begin, at + 1, rows)
+    rows = {name: index[-1:] for name, index in rows.items()}
+    return rows, {name: found[name][-1:] for name in outputs}, 1
+
+
+def _ways_on(check: Check, step: int, ways, outputs):
+    """States after a step, each with the messages that lead to it, that give its outputs.
+
+    Of those that come to the same state the oldest messages leave most to choose from.
+    """
+    found = {}
+    tried = ((*one, option) for one in ways for option in _options(check, step, one[1][-1]))
+    for state, way, option in tried:
+        rows = _consecutive(check, step, step + 1, option)
+        if not min(map(len, rows.values())):
+            continue
+        check.block.state = state
+        computed = check.run(step, step + 1, rows)
+        if any(check.differs(outputs[name], step, computed[name]) for name in outputs):
+            continue
+        _, numbers, others = packed(check.block.state)
+        bits = tuple(np.asarray(one).tobytes() for one in (*numbers, *others))
+        if bits not in found or sum(option.values()) < sum(found[bits][1][-1].values()):
+            found[bits] = check.block.state, [*way, option]
+    return [*found.values()][:_WAYS]
