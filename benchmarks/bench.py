@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""``./glider bench``: how fast the stack is, as ratios to floors measured in the same run.
+"""``./glider bench``: how fast the stack is, as ratios to baselines measured in the same run.
 
 A section is a module of this folder with
 
@@ -57,7 +57,7 @@ def bench(
 ) -> None:
     """Measure how fast this machine flies.
 
-    Every time stands beside its ratio to a floor, which is measured in the same run: what the
+    Every time stands beside its ratio to a baseline, measured in the same run: what the
     same work costs without this stack. Use an idle machine.
     """
     if against and not (against / 'glider').is_file():

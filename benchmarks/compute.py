@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The direct engine on one processor, and the plant beside the same arithmetic in C (floor.py).
 
-Times are processor time of this thread, the least of several, plant and floor by turns: what else
+Times are processor time of this thread, the least of several, each by turns: what else
 the machine does counts little. Compilation stands apart.
 """
 
@@ -44,7 +44,7 @@ MEANING = {
 
 
 def measure(progress: Callable[[str], None]) -> dict:
-    """Figures of the direct engine; a RuntimeError if the floor does not compute the same bits."""
+    """Figures of the direct engine; a RuntimeError if C does not compute the same bits."""
     progress('compiling all kernels')
     with TemporaryDirectory() as empty:
         compilation = {'compile_s': _warm_up_s(empty), 'load_s': _warm_up_s(empty)}

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""A tick of the plant in flight, and the same arithmetic in C99, as cc compiles it: the floor.
+"""A tick of the plant in flight, and the same arithmetic in C99, as cc compiles it: the baseline.
 
 The C is in ``floor/``. What it shares with the Python is not written twice: structs and constants
 are generated from the Python into ``names.h``, and states and parameters are handed over. Built
@@ -130,7 +130,7 @@ def _constants() -> str:
 
 
 class Floor:
-    """The compiled floor; its structs are made of the state and the params of any plant.
+    """The compiled baseline; its structs are made of the state and the params of any plant.
 
     Raises RuntimeError if the compiler refuses.
     """

@@ -3,7 +3,7 @@
 """Flights over topics: ticks per second beside what the middleware gives to bare nodes.
 
 In a tick one message after the other passes plant, navigation, guidance, control, guard and plant
-again: five hops. The floor is five bare rclpy nodes that hand on one message in that ring, in the
+again: five hops. The baseline is five bare nodes that hand on one message in that ring, in the
 same environment and, because machines are not the same every minute, in turn with the flights.
 """
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""One process of a ring of bare rclpy nodes that hand an Odometry round: the floor of the nodes.
+"""One process of a ring of bare rclpy nodes that hand an Odometry round: baseline of the nodes.
 
     python benchmarks/ping_pong.py PLACE RING TICKS
 

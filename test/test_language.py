@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a person reads is short, and in the words of the field."""
 
+import inspect
 import json
 import re
+import tokenize
 from pathlib import Path
 
 import click
@@ -19,6 +21,7 @@ ROOT = Path(__file__).resolve().parents[1]
 THEORY = {'docs/theory.md', 'docs/paper.md'}
 DOCUMENTS = sorted([ROOT / 'README.md', ROOT / 'CONTRIBUTING.md', *ROOT.glob('docs/*.md')])
 DECISIONS = sorted(ROOT.glob('docs/adr/*.md'))
+SOURCES = sorted((ROOT / 'src').glob('*/glider_*'))
 MOST_WORDS = 35
 
 #: Words that this project once had of its own, and those of the field.
@@ -33,7 +36,7 @@ OWN_WORDS = {
     r'(?:way|ways) under water|stays? at the surface': 'dive segment, surface interval',
     r'beside (?:the|its|their) paths?|(?<!set )\baside\b': 'cross-track',
     r'lead of turns': 'drift pre-compensation',
-    r'\brooms?\b': 'packages',
+    r'(?<!disk had )(?<!is )\brooms?\b(?! for)': 'packages',
     r'\bfloors?\b': 'baselines',
     r'\btold\b|\bheard\b(?! of)': 'reported, received',
     r'\bunwell\b|\bis well\b': 'unhealthy, healthy',
@@ -94,6 +97,19 @@ def test_sentences_are_short(path):
 )
 def test_words_are_those_of_the_field(path):
     assert own_words(path.read_text(encoding='utf-8')) == []
+
+
+@pytest.mark.parametrize('package', SOURCES, ids=lambda path: path.name)
+def test_words_in_code_are_those_of_the_field(package):
+    """In comments and docstrings."""
+    for path in package.rglob('*.py'):
+        with tokenize.open(path) as file:
+            tokens = list(tokenize.generate_tokens(file.readline))
+        said = [one.string.lstrip('#: ') for one in tokens if one.type == tokenize.COMMENT]
+        said += [inspect.cleandoc(one.string) for one in tokens if one.string.startswith('"""')]
+        text = '\n\n'.join(said).lower()
+        # in kilograms, positive where it sinks, and so named in scenarios
+        assert own_words(text.replace('net heaviness', '')) == [], path
 
 
 def test_bad_text_is_found():

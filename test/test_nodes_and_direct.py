@@ -15,7 +15,7 @@ from mcap.reader import make_reader
 
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.signals import TICK_S
-from glider_base.wiring import BELIEFS
+from glider_base.wiring import ESTIMATES
 from glider_bringup.engines.processes import RECORDER, Layout, node_commands, run_nodes
 from glider_mission.blocks import COLUMNS
 from glider_mission.recording.mcap_reader import Bag
@@ -138,11 +138,11 @@ def reckoned(glider, tmp_path_factory) -> dict[str, Path]:
 
 
 def test_dead_reckoning_is_the_same_over_nodes(reckoned):
-    """Sensors, beliefs and all that follows from them, to the last bit; and the score."""
+    """Sensors, estimates and all that follows from them, to the last bit; and the score."""
     nodes, engine = (digests(folder) for folder in reckoned.values())
     assert nodes == engine
     expected = set(PER_TICK) - {'/glider/measured_odom'}
-    expected |= {f'/glider/{name}' for name in ('imu', 'pressure', 'fix', 'altitude', *BELIEFS)}
+    expected |= {f'/glider/{name}' for name in ('imu', 'pressure', 'fix', 'altitude', *ESTIMATES)}
     assert set(nodes) == expected
     assert {count for count, _ in nodes.values()} == {round(RECKONED_S / TICK_S)}
     cards = [json.loads((folder / 'score.json').read_text()) for folder in reckoned.values()]

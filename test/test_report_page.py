@@ -385,7 +385,7 @@ def check_reckoned(page, reckoned_run, width):
     panels = page.evaluate(DRAWN)
     check_drawn(panels)
     assert page.evaluate('document.documentElement.scrollWidth') == width, 'nothing sticks out'
-    assert {'plan', 'believed_cross_track', 'place_error'} < {panel['id'] for panel in panels}
+    assert {'plan', 'estimated_cross_track', 'place_error'} < {panel['id'] for panel in panels}
     reports = json.loads((reckoned_run / 'score.json').read_text())['navigation']['reports']
     (plan,) = (panel for panel in panels if panel['kind'] == 'plan')
     drawn = {trace['name']: trace for trace in plan['traces']}

@@ -3,7 +3,7 @@
 """What a block declares of itself, and how it is called in loops over many ticks.
 
 A block answers a tick: from the numbers of its input topics it makes those of its outputs, and
-flags of which changes are told as events. Nodes, the direct engine, recordings and `verify` all
+flags of which changes become events. Nodes, the direct engine, recordings and `verify` all
 call it through the same kernel.
 """
 
@@ -34,8 +34,8 @@ class Block(NamedTuple):
     settings: type[Settings]  #: with ``params()`` and ``initial_state()``
     tick: Callable  #: kernel that fills `block_tick` for its params
     flags: tuple[str, ...] = ()  #: names of its flags
-    quiet: tuple[int, ...] = ()  #: flags of which nothing needs to be told at the beginning
-    every_ns: int = 0  #: a change of the flags is told at most once in this time
+    quiet: tuple[int, ...] = ()  #: flags of which nothing needs to be reported at the beginning
+    every_ns: int = 0  #: a change of the flags is reported at most once in this time
     say: Callable[..., Said] | None = None  #: what flags say
     surface: Callable | None = None  #: kernel: state of a block that asks for the surface
     clear: Callable | None = None  #: kernel: state of a block that forgets what has latched
@@ -88,7 +88,7 @@ def _rows_at(arrays, row):
 
 @kernel
 def _differs(flags, reported):
-    """Whether one of some flags, int64[m], is not as it was told."""
+    """Whether one of some flags, int64[m], is not as it was reported."""
     for i in range(len(flags)):
         if flags[i] != reported[i]:
             return True
@@ -97,7 +97,7 @@ def _differs(flags, reported):
 
 @kernel
 def changes_to_tell(flags, stamps_ns, every_ns, reported, reported_ns):
-    """Where flags int64[n, m] have changed, told at most once in ``every_ns``; indices int64[k].
+    """Where flags int64[n, m] have changed, at most once in ``every_ns``; indices int64[k].
 
     The flags ``reported`` last, int64[m], are changed in place.
     """
@@ -115,14 +115,14 @@ def changes_to_tell(flags, stamps_ns, every_ns, reported, reported_ns):
 
 
 class Telling:
-    """Which changes of the flags of a block are told from a time on, and what was told last."""
+    """Which changes of the flags of a block are reported from a time on, and what was last."""
 
     def __init__(self, block: Block, start_ns: int = 0) -> None:
         self.block = block
         self._reported, self._reported_ns = tuple(block.quiet), start_ns - block.every_ns
 
     def among(self, flags: np.ndarray, stamps_ns: np.ndarray) -> np.ndarray:
-        """Indices of the ticks at which something is told; flags int64[n, m], stamps int64[n]."""
+        """Indices of ticks at which something is reported; flags int64[n, m], stamps int64[n]."""
         every_ns = self.block.every_ns
         reported = np.array(self._reported, np.int64)
         found = changes_to_tell(flags, stamps_ns, every_ns, reported, self._reported_ns)
@@ -131,7 +131,7 @@ class Telling:
         return found
 
     def is_due(self, flags: tuple[int, ...], stamp_ns: int) -> bool:
-        """Whether flags of one tick are told."""
+        """Whether flags of one tick are reported."""
         if flags == self._reported or 0 <= stamp_ns - self._reported_ns < self.block.every_ns:
             return False
         self._reported, self._reported_ns = flags, stamp_ns

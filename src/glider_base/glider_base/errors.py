@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is told to a person: short, printable, whatever a file or an option holds.
+"""What a person reads of an error: short, printable, whatever a file or an option holds.
 
 And how a process ends: its exit code, and the last words of a node that gives up.
 """
@@ -20,7 +20,7 @@ MAX_LINES = 20
 MAX_LINE = 900
 #: Characters of a value in an error.
 MAX_SHOWN = 80
-#: So many of the fields that were changed are told with what is wrong.
+#: So many of the fields that were changed are shown with what is wrong.
 CHANGES_SHOWN = 4
 
 #: The machine or the result is to blame: a full disk, a failed flight, a vehicle that is lost,

@@ -116,7 +116,7 @@ Tell = Callable[[], Callable[[], None] | None]
 
 
 class _Compiling(event.Listener):
-    """Tells when numba begins to compile, and ends what was told when it has."""
+    """Tells when numba begins to compile, and ends what it has said when it has."""
 
     def __init__(self, tell: Tell) -> None:
         self._tell, self._depth, self._is_shown = tell, 0, False

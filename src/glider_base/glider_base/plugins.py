@@ -31,7 +31,7 @@ SURFACES, SURFACE_LAWS = 'glider.surfaces', 'glider.surface_laws'
 COMMANDS = 'glider.commands'
 GROUPS = (CONTROL_LAWS, CURRENTS, GUIDANCE_METHODS, NAVIGATION_METHODS, SURFACE_LAWS, SURFACES)
 
-#: Variable that says what was told already, so that the processes of a run do not say it again.
+#: Variable that says what was said already, so that the processes of a run do not say it again.
 TOLD = 'GLIDER_TOLD'
 
 ClassT = TypeVar('ClassT', bound=type)
@@ -74,7 +74,7 @@ def classes(
 ) -> dict[str, ClassT]:
     """Subclasses of ``base`` by name: one in each module of ``package``, then those registered.
 
-    What cannot be used, such as a name in ``taken`` or a class that ``check`` raises for, is told
+    What cannot be used, such as a name in ``taken`` or a class that ``check`` raises for, is named
     on standard error, and is not there: the others fly on. Every field has a default, unless
     they need not be ``complete``.
     """
@@ -119,7 +119,7 @@ def offered(group: str) -> dict[str, EntryPoint]:
 
 
 def used(point: EntryPoint, use: Callable[[Any], Any]) -> Any:
-    """What ``use`` makes of what is registered; None, and told, if it cannot be used."""
+    """What ``use`` makes of what is registered; None, and reported, if it cannot be used."""
     try:
         return use(point.load())
     except (Exception, SystemExit) as error:  # it may not be our code

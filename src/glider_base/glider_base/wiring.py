@@ -171,7 +171,7 @@ class Wired(NamedTuple):
 SENSORS = ('measured_odom', 'imu', 'pressure', 'fix', 'altitude')
 #: What a vehicle has samples of as often as its `imu_period_s` says, and not in every tick.
 SAMPLED = ('imu', 'pressure', 'fix', 'battery')
-#: Age (s) from which on a topic is silent that need not be told often.
+#: Age (s) from which on a topic is silent that need not come often.
 SLOW_S = {'battery': 600.0, 'health': 10.0, 'altitude': 5.0}
 #: What stands for a topic that may be silent for as long as it likes: under water there is no fix,
 #: far above the bottom no echo. A vehicle need not say how it is, either: less than nothing is not
@@ -185,7 +185,7 @@ WHEN_SILENT = {
 #: Of those of them, what says how the vehicle is: a number that is NaN is not measured.
 CONDITION = ('health', 'battery')
 #: What ways to navigate may tell beside odom; the same holds for them as for `SENSORS`.
-BELIEFS = ('believed_current', 'believed_surface_current')
+ESTIMATES = ('believed_current', 'believed_surface_current')
 
 PLANT = Wired(
     'plant',
@@ -200,7 +200,7 @@ NAVIGATION = Wired(
     'navigation',
     'glider_navigation',
     inputs=('joint_states', *SENSORS),
-    outputs=('odom', *BELIEFS),
+    outputs=('odom', *ESTIMATES),
 )
 GUIDANCE = Wired(
     'guidance',
@@ -230,8 +230,8 @@ WIRING = (PLANT, CURRENT, NAVIGATION, GUIDANCE, CONTROL, GUARD)
 
 
 def present(names: Iterable[str], topics: Iterable[str]) -> tuple[str, ...]:
-    """Those of the names that there are in a run with these of `SENSORS` and `BELIEFS`."""
-    left_out = {*SENSORS, *BELIEFS}.difference(topics)
+    """Those of the names that there are in a run with these of `SENSORS` and `ESTIMATES`."""
+    left_out = {*SENSORS, *ESTIMATES}.difference(topics)
     return tuple(name for name in names if name not in left_out)
 
 

@@ -235,7 +235,7 @@ def shares():
 
 @contextmanager
 def interrupt_shown():
-    """Ctrl-C ends what is done in the block, is told, and is the exit code."""
+    """Ctrl-C ends what is done in the block, is said, and is the exit code."""
     try:
         yield
     except KeyboardInterrupt:

@@ -731,7 +731,7 @@ def test_law_that_cannot_be_flown_is_told(law, choices, words):
 
 @pytest.mark.parametrize(
     ('call', 'what'),
-    [(guidance_step, 'Asked'), (navigation_step, 'Believed'), (field_velocity, 'to the north')],
+    [(guidance_step, 'Asked'), (navigation_step, 'Estimate'), (field_velocity, 'to the north')],
 )
 def test_method_that_returns_nothing_somewhere_is_told(call, what):
     class Params(NamedTuple):

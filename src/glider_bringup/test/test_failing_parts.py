@@ -21,7 +21,7 @@ from glider_bringup.engines.direct import MissionState, fly
 from glider_bringup.engines.flight import mission_of
 from glider_control.control import control_step
 from glider_control.intake import REFUSED
-from glider_guard.guard import Heard, guard_step
+from glider_guard.guard import Received, guard_step
 from glider_guard.rows import FROZEN, LOST, STUCK_BUOYANCY, STUCK_ROLL, SURFACES, TOO_DEEP
 from glider_guidance.guidance import guidance_abort, guidance_step
 from glider_guidance.yo.stage import GLIDING_DOWN, GLIDING_UP, INFLECTING_UP, WAITING_ON_SURFACE
@@ -124,7 +124,7 @@ def tick(
         control, seen, plant.joints, reference, params.control, TICK_S
     )
     told = (health_of(plant), battery_of(plant.ledger, params.plant.energy))
-    heard = Heard(controlled.command, seen, plant.joints, reference.p_d, depth, NO_ECHO, *told)
+    heard = Received(controlled.command, seen, plant.joints, reference.p_d, depth, NO_ECHO, *told)
     guard, guarded = guard_step(guard, heard, params.guard, TICK_S)
     water = water_from_wire(water_to_wire(water))
     plant = plant_step(plant, guarded.command, water, params.plant, TICK_S, guarded.drops)

@@ -20,7 +20,10 @@ from glider_mission.rules import Rules
 from glider_mission.scenario import load_scenario
 from glider_model.vehicle.file import load_vehicle
 
-TRUTH, BELIEF = COLUMNS['ground_truth/odom'], slice(*[COLUMNS['odom'].start + i for i in (0, 13)])
+TRUTH, ESTIMATE = (
+    COLUMNS['ground_truth/odom'],
+    slice(*[COLUMNS['odom'].start + i for i in (0, 13)]),
+)
 
 
 def scores(
@@ -30,9 +33,9 @@ def scores(
     log = np.zeros((len(depth), ROW))
     log[:, TRUTH.start + 1], log[:, TRUTH.start + 2] = north, -depth
     log[:, TRUTH.start + 3] = 1.0
-    log[:, BELIEF] = log[:, TRUTH.start : TRUTH.start + 13]
+    log[:, ESTIMATE] = log[:, TRUTH.start : TRUTH.start + 13]
     if believed is not None:
-        log[:, BELIEF.start + 2] = -believed
+        log[:, ESTIMATE.start + 2] = -believed
     reference = COLUMNS['reference'].start
     log[:, reference + 1], log[:, reference + 3] = target, 1.0
     log[:, COLUMNS['tracking_error'].start + 1] = e2
@@ -251,7 +254,7 @@ def test_what_cannot_be_held_is_infeasible_but_not_if_the_vehicle_is_lost():
 def scorer_with(depth, infeasible):
     log = np.zeros((len(depth), ROW))
     log[:, TRUTH.start + 2], log[:, TRUTH.start + 3] = -depth, 1.0
-    log[:, BELIEF] = log[:, TRUTH.start : TRUTH.start + 13]
+    log[:, ESTIMATE] = log[:, TRUTH.start : TRUTH.start + 13]
     log[:, COLUMNS['reference'].start + 3] = 1.0
     log[:, COLUMNS['infeasible']] = infeasible
     scorer = Scorer(load_scenario())

@@ -214,7 +214,7 @@ def test_report_shows_true_and_believed(flown, data):
     flown.report(file)
     body, page = read_page(file)
     panels = {panel['id']: panel for panel in page['panels']}
-    assert {curve['label'] for curve in panels['believed_cross_track']['curves']} == {
+    assert {curve['label'] for curve in panels['estimated_cross_track']['curves']} == {
         *('true', 'estimated'),
     }
     run, reports = page['runs'][0], flown.score['navigation']['reports']

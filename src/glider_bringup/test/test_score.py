@@ -25,7 +25,7 @@ quick = settings(max_examples=20)
 TARGET_M = 1000.0
 #: Where the vehicle is, and where it believes it is.
 TRUTH = COLUMNS['ground_truth/odom']
-BELIEF = slice(COLUMNS['odom'].start, COLUMNS['odom'].start + 13)
+ESTIMATE = slice(COLUMNS['odom'].start, COLUMNS['odom'].start + 13)
 
 
 def wire_quaternion(theta, psi):
@@ -56,7 +56,7 @@ def make_log(t, **given):
     odom, reference = log[:, TRUTH], log[:, COLUMNS['reference']]
     odom[:, 0], odom[:, 1], odom[:, 2] = value['east'], value['north'], -value['depth']
     odom[:, 3:7] = wire_quaternion(value['theta'], value['psi'])
-    log[:, BELIEF] = log[:, TRUTH]
+    log[:, ESTIMATE] = log[:, TRUTH]
     reference[:, 0], reference[:, 1] = value['target_e'], value['target_n']
     reference[:, 3:7] = wire_quaternion(value['theta_ref'], value['psi_ref'])
     reference[:, 9] = -value['rate_ref']
@@ -86,13 +86,15 @@ def test_sinusoidal_error_has_its_rms_and_its_amplitude():
 
 @pytest.mark.parametrize('heading_deg', [0.0, 90.0, -120.0])
 def test_what_is_believed_is_not_what_is_scored(heading_deg):
-    """Believed on its path, and really 30 m to starboard of it and 10 m below."""
+    """Estimate on its path, and really 30 m to starboard of it and 10 m below."""
     t, psi = ticks(2000.0), math.radians(heading_deg)
     way = 0.5 * t
     n, e = math.cos(psi), math.sin(psi)
     place = {'north': n * way - 30.0 * e, 'east': e * way + 30.0 * n, 'depth': 510.0}
     log = make_log(t, psi=psi, target_n=n * way, target_e=e * way, **place)
-    log[:, BELIEF.start : BELIEF.start + 3] = np.stack((e * way, n * way, -500.0 + 0 * t), axis=1)
+    log[:, ESTIMATE.start : ESTIMATE.start + 3] = np.stack(
+        (e * way, n * way, -500.0 + 0 * t), axis=1
+    )
     result = score(log)
     assert result['cross_track_m']['rms_steady'] == pytest.approx(30.0, abs=1e-9)
     assert result['depth_m']['max'] == pytest.approx(510.0)

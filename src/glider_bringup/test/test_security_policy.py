@@ -15,7 +15,7 @@ from rclpy.parameter import Parameter
 
 from glider_base.ros.places import domain_id
 from glider_base.ros.wire.topics import GUARD, GUIDANCE, PLANT, RECORDER, TOPICS
-from glider_base.wiring import BELIEFS, SENSORS, WIRING
+from glider_base.wiring import ESTIMATES, SENSORS, WIRING
 from glider_bringup.engines.processes import AUTOPILOT, ON_BOARD
 from glider_bringup.nodes.recorder_node import RecorderNode
 from glider_control.nodes.control_node import ControlNode
@@ -188,8 +188,8 @@ def test_every_node_is_allowed_what_it_does(graph):
 
 
 def test_no_node_is_allowed_more(graph):
-    """But what depends on the run: sensors and beliefs, simulated time, who tells types."""
-    varies = {*SENSORS, *BELIEFS, '/clock', '/parameter_events', '~/get_type_description'}
+    """But what depends on the run: sensors and estimates, simulated time, who tells types."""
+    varies = {*SENSORS, *ESTIMATES, '/clock', '/parameter_events', '~/get_type_description'}
     for node, allowed in _written().items():
         may = {_absolute(name, node) for name in varies}
         for right, names in allowed.items():

@@ -15,28 +15,28 @@ from glider_model.onboard.gate import (
     INITIAL_GATE,
     GateParams,
     GateState,
-    are_believed,
+    are_plausible,
     gate_step,
     is_lost,
 )
 
-#: Told: something was refused.
+#: Reported: something was refused.
 REFUSED = 64
-#: A change of what is told is told at most once in this time (ns).
+#: A change of what is reported is an event at most once in this time (ns).
 TELL_EVERY_NS = 1_000_000_000
-#: A refusal is told for so long (s): an event is told once a second at most.
+#: A refusal is reported for so long (s): an event is, once a second at most.
 REFUSAL_SHOWN_S = 2.0
 
 
 class IntakeParams(NamedTuple):
-    """What is believed."""
+    """What is plausible."""
 
     gate: GateParams
     range: Joints  #: of the actuators
 
 
 class IntakeState(NamedTuple):
-    """The last that was believed."""
+    """The last that was plausible."""
 
     gate: GateState = INITIAL_GATE  #: the odometry that serves
     joints: Joints = Joints(0.0, 0.0, 0.0, 0.0)
@@ -64,7 +64,7 @@ def take_in(state, odometry, joints, reference, params, dt):
     """
     gate = gate_step(state.gate, odometry, params.gate, dt)
     joints_s, reference_s, refused_s = 0.0, 0.0, state.refused_s + dt
-    if not are_believed(joints, params.range):
+    if not are_plausible(joints, params.range):
         joints, joints_s = state.joints, state.joints_s + dt
     if not _is_finite(reference):
         reference, reference_s = state.reference, state.reference_s + dt

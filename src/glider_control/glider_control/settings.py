@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of control, and what the kernels are told by them."""
+"""Settings of control, and the kernels' params by them."""
 
 import math
 from typing import Literal
@@ -113,7 +113,7 @@ class ControlLawSettings(_LawChoice):
 
 
 class ControlSettings(ControlLawSettings):
-    """Everything the control node is told."""
+    """Everything the control node is set to."""
 
     vehicle: str = Field('zhang2021', description='vehicle: masses, ranges, polar, steering')
 

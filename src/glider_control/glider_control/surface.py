@@ -58,7 +58,7 @@ def _bank_to_turn(state, seen, params, dt):
 @slot
 @default
 def surface_learnt(learnt, state, params):
-    """What is told on the topic ``adaptation``, with what steering has learnt of its surface.
+    """What is published on the topic ``adaptation``, with what steering has learnt of its surface.
 
     Both it and ``learnt``, what the control law has learnt, are an `Adaptation`. ``state`` is that
     of the steering; by the type of `SurfaceLawSettings.params`.

@@ -153,7 +153,7 @@ def _pumpings(path: Path) -> _Dive:
 
 
 def _moved(found: dict[str, np.ndarray], name: str) -> np.ndarray:
-    """Energy (J) and way (m, deg) of one moving mass in a dive, shape (2,); zeros if not told."""
+    """Energy (J) and way (m, deg) of one moving mass in a dive, shape (2,); zeros without one."""
     columns = [found.get(f'{name}_{key}', ()) for key in names_of(name)]
     if not all(map(len, columns)):
         return np.zeros(2)

@@ -141,9 +141,9 @@ def _of_other_times(dates: dict[str, np.ndarray]) -> dict[str, str]:
         if abs(at - usual) > LONGEST_FLIGHT_S
     }
     near = np.flatnonzero(np.abs(middle - usual) <= LONGEST_FLIGHT_S)
-    believed = near[_longest_row(begin[near], end[near])]
-    for one in np.setdiff1d(near, believed):
-        same = believed[(begin[believed] < end[one]) & (end[believed] > begin[one])]
+    longest = near[_longest_row(begin[near], end[near])]
+    for one in np.setdiff1d(near, longest):
+        same = longest[(begin[longest] < end[one]) & (end[longest] > begin[one])]
         if len(same):
             found[names[one]] = f'it is of the time of {names[same[0]]}'
     return found

@@ -5,7 +5,7 @@
 It is the kernel of its node, fed as by a driver: a sample, or a fix, is there from the tick after
 it was recorded, and until the next one. Where a base station wrote the buoyancy it is that of the
 buoyancy engine; lift and drag are those of the flight. The way through the water is that of a
-second run, which believes in no current.
+second run, which assumes no current.
 """
 
 import itertools
@@ -38,13 +38,13 @@ RECORDED = ('imu', 'pressure', 'fix')
 DENSITY = 1027.5
 #: Standard deviation of a fix, north and east (m).
 FIX_STD_M = 5.0
-#: No engine has more oil than this (cc): all of what is recorded is believed.
+#: No engine has more oil than this (cc): all of what is recorded counts.
 MOST_OIL_CC = 2000.0
 #: Buoyancy tells the speed of a dive if it is known for this share of the samples.
 BUOYANCY_KNOWN = 0.5
 #: The stay before the first dive counts for no longer than this (s).
 FIRST_STAY_S = 6.0 * 3600.0
-#: What was the current of the last dive is told when the next one begins: it is made up, so long
+#: The current of the last dive is recorded when the next one begins: it is made up, so long
 #: (s) and so deep (m).
 MADE_UP_S, MADE_UP_M = 5.0, 10.0
 #: So many ticks are worked through at once.
@@ -63,7 +63,7 @@ class Row(NamedTuple):
     dived_m: np.ndarray
     surfaced_m: np.ndarray
     way_m: np.ndarray  #: way through the water between the two (m)
-    reported_mps: np.ndarray  #: current that it told afterwards (m/s)
+    reported_mps: np.ndarray  #: current that it reported afterwards (m/s)
     #: Distance from where it surfaced to where it was forecast (m), by name; NaN for the first.
     missed_m: dict[str, float]
     over: str  #: what the vehicle's own current is a mean over, see `Flight`
@@ -148,7 +148,7 @@ def _navigated(
 
 
 def _published(block: RecordedBlock, driver: '_Driver', ticks: np.ndarray, begin_s: float):
-    """Times, places, told currents and phases of some ticks."""
+    """Times, places, reported currents and phases of some ticks."""
     time_s = begin_s + TICK_S * ticks
     outputs, flags = block.run(ticks * TICK_NS, driver.inputs(time_s))
     current = outputs.get('believed_current', np.full((len(ticks), 2), math.nan))
@@ -210,7 +210,7 @@ def _vehicle(segment: Segment) -> str:
     changes = {f'hydrodynamics.{name}': value for name, value in coefficients.items()}
     changes |= {
         'buoyancy_engine.range': MOST_OIL_CC,
-        'pump_x': 0.0,  # nothing is told of the masses that oppose it
+        'pump_x': 0.0,  # nothing is recorded of the masses that oppose it
         'shallowest_glide': math.degrees(polar.shallowest_rad),
     }
     return changed_vehicle(VEHICLE, changes)
@@ -223,7 +223,7 @@ class _Driver:
         self.time_s, self.fix_s = samples.time_s, fixes.time_s
         self.pressure = pressure_at(samples.depth_m)
         self.imu = _imu_rows(samples.pitch_rad, samples.heading_rad)
-        # Where none is recorded, in a turn-over, none tells the speed.
+        # Where none is recorded, in an inflection, none tells the speed.
         self.joints = np.outer(-np.nan_to_num(samples.buoyancy_kg), [1.0, 0.0, 0.0, 0.0])
         origin, variance = start.origin.params(), FIX_STD_M**2
         self.fix = np.array(
@@ -235,9 +235,9 @@ class _Driver:
         last = np.searchsorted(self.time_s, time_s, 'right') - 1
         begun = last >= 0  # before, it lies still at the surface
         fix = np.tile(WHEN_SILENT['fix'], (len(time_s), 1))
-        heard = np.searchsorted(time_s, self.fix_s)
-        inside = (heard < len(time_s)) & (self.fix_s > time_s[0] - TICK_S)
-        fix[heard[inside]] = self.fix[inside]
+        received = np.searchsorted(time_s, self.fix_s)
+        inside = (received < len(time_s)) & (self.fix_s > time_s[0] - TICK_S)
+        fix[received[inside]] = self.fix[inside]
         return {
             'joint_states': np.where(begun[:, None], self.joints[last], 0.0),
             'imu': self.imu[np.maximum(last, 0)],
@@ -260,7 +260,7 @@ def _imu_rows(pitch_rad, heading_rad):
 
 #: Method of navigation, if nothing else is said.
 METHOD = 'dead_reckoned'
-#: A current that is further off than this has its reason told (m/s).
+#: A current that is further off than this has its reason printed (m/s).
 FAR_OFF_MPS = 0.02
 #: Names of the forecasts.
 FORECASTS = ('none', 'persistence', 'ours')
@@ -295,7 +295,7 @@ def navigate(flight: Flight, progress: Progress, method: str = METHOD) -> list[R
 
 
 def _row(segment: Segment, under: _Under, led_m, reported_mps, last_mps, over: str) -> Row:
-    """What came out; forecasts know what the dive before told of the current, if there is one."""
+    """What came out; forecasts know the current of the dive before, if there is one."""
     dived_s, dived_m = _at_surface(segment.before, -1, under.dived_s)
     surfaced_s, surfaced_m = _at_surface(segment.after, 0, under.surfaced_s)
     dive, missed = (dived_s, surfaced_s, dived_m, surfaced_m), dict.fromkeys(FORECASTS, math.nan)

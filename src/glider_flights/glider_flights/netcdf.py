@@ -25,7 +25,7 @@ _UNITS = {
 _TEXTS = ('model', 'vehicle', 'fix_quality')
 #: So large are values that are missing, where a file does not say which they are.
 FILLS = 1e20
-#: What a glider, or its base station, can have been told (m, rad, dbar, m/s): other values are
+#: What a glider, or its base station, can have been set to (m, rad, dbar, m/s): other values are
 #: damage, or stand for none where a file does not say which does.
 PLAUSIBLE = {
     **dict.fromkeys(('depth_m', 'pressure'), (-50.0, 7000.0)),

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recorded flight of a real glider, whoever made it: dives between surfacings with fixes.
 
-Of what its files say it is cut into segments, from one stay at the surface to the next.
+Of what its files say it is cut into segments, from one surface interval to the next.
 
 Positions are north and east (m) of the first fix, angles in the world NED and the body FRD.
 """
@@ -25,7 +25,7 @@ DIVE_DEPTH_M = 5.0
 LONGEST_STAY_S = 3600.0
 #: A segment is not shorter than this under water (s): its current would be the noise of its fixes.
 SHORTEST_SEGMENT_S = 300.0
-#: A fix is told at the depth of a sample that is no further from it than this (s).
+#: A fix has the depth of a sample that is no further from it than this (s).
 NEAR_S = 30.0
 #: Further than this from the others of its stay (m), and as far as it may have drifted at no more
 #: than this (m/s), a fix is wrong; a current and a glider together are no faster either.
@@ -44,7 +44,7 @@ WHY_LEFT_OUT = {
 
 
 class Fixes(NamedTuple):
-    """Fixes of one stay at the surface, in the order of time; may be none."""
+    """Fixes of one surface interval, in the order of time; may be none."""
 
     time_s: np.ndarray  #: shape (n,), s since 1970
     place_m: np.ndarray  #: shape (n, 2): north, east (m) of the flight's first fix
@@ -71,7 +71,7 @@ class OnBoard(NamedTuple):
 
     dac_mps: np.ndarray = NOT_KNOWN  #: depth-averaged current (m/s)
     way_m: np.ndarray = NOT_KNOWN  #: way through the water (m)
-    #: Where it believed to be when it came up (m of the flight's first fix).
+    #: Its own estimate of where it came up (m of the flight's first fix).
     surfaced_m: np.ndarray = NOT_KNOWN
 
 
@@ -86,11 +86,11 @@ class Polar(NamedTuple):
     induced: float  #: c (1/rad^2)
     exponent: float  #: s
     area_m2: float  #: A (m^2)
-    shallowest_rad: float  #: at shallower pitch the polar is not believed (rad)
+    shallowest_rad: float  #: at shallower pitch the polar does not hold (rad)
 
 
 class Segment(NamedTuple):
-    """From one stay at the surface to the next."""
+    """From one surface interval to the next."""
 
     #: Of the file that it begins in.
     name: str
@@ -357,7 +357,7 @@ class Cut(NamedTuple):
 
 
 def stays(fixes: Fixes, samples: Samples) -> list[Fixes]:
-    """Fixes by stay at the surface, without those told while deep and those far off."""
+    """Fixes by surface interval, without those reported while deep and those far off."""
     order = np.unique(fixes.time_s, return_index=True)[1]
     time_s, place_m = fixes.time_s[order], fixes.place_m[order]
     if len(samples.time_s):

@@ -56,7 +56,7 @@ UPDATED = 2
 WRITTEN = re.compile(r'(.+)-(\d+)-(\d+)-(\d+)-(\d+)')
 #: Times in one file are no further apart than this (s).
 LONGEST_FILE_S = 20 * 86_400.0
-#: Our names of what is not believed whatever it says.
+#: Our names of what is ignored whatever it says.
 OURS = {'m_depth': 'depth_m', 'm_pitch': 'pitch_rad', 'm_heading': 'heading_rad'}
 #: Without these nothing can be reckoned.
 NEEDED = ('m_depth', 'm_pitch', 'm_heading', 'm_gps_lat', 'm_gps_lon')
@@ -84,7 +84,7 @@ POLAR = Polar(
 )
 #: The vehicle's own current is of the same dive if the time it reckoned for is, up to this share.
 SAME_TIME = 0.2
-#: The current of a segment is told until so long after the next dive has begun (s).
+#: The current of a segment is reported until so long after the next dive has begun (s).
 LATE_S = 60.0
 
 Names = tuple[str, ...]
@@ -431,8 +431,8 @@ def _on_board(
         way = (0.5 * (velocity[:, 1:] + velocity[:, :-1]) * np.diff(time_s)).sum(axis=1)
     time_s, degrees = _places(sensors, 'm_lat', 'm_lon')
     under = (time_s > begin_s) & (time_s < surfaced_s)
-    believed = local_metres(origin, *degrees[under][-1]) if under.any() else NOT_KNOWN
-    return OnBoard(dac, way, believed)
+    estimated = local_metres(origin, *degrees[under][-1]) if under.any() else NOT_KNOWN
+    return OnBoard(dac, way, estimated)
 
 
 def _true(x: float, y: float, declined: float) -> np.ndarray:

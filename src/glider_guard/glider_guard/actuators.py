@@ -75,7 +75,7 @@ def follow(
 ) -> tuple[Followers, int]:
     """All actuators a tick later, and the rows of those that do not follow.
 
-    ``joints`` is where they are, ``command`` what they were last told.
+    ``joints`` is where they are, ``command`` where they were last sent.
     """
     off, least = limits.tolerance, limits.progress
     state = Followers(

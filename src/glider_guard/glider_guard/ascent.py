@@ -57,8 +57,8 @@ class Rise(NamedTuple):
     m_b: float  #: where the pump is (kg)
     x_p: float  #: where the mass is (m)
     rate: float = 0.0  #: measured vertical rate (m/s, + down)
-    sees: bool = False  #: whether that is to be believed
-    moves: bool = False  #: whether it is shown at all: what is not believed tells of a stall still
+    sees: bool = False  #: whether that is to be trusted
+    moves: bool = False  #: whether it is shown at all: what is not trusted tells of a stall still
     under: bool = True  #: under water
     theta: float = 0.0  #: pitch (rad)
     is_new: bool = False  #: whether that is measured anew

@@ -7,14 +7,14 @@ from glider_base.frames import covariance_from_wire, odometry_from_wire
 from glider_base.kernel import kernel, replace
 from glider_base.signals import Battery, Health, Joints
 from glider_base.wiring import GUARD as WIRED
-from glider_guard.guard import INITIAL_GUARD, GuardParams, Heard, guard_step
+from glider_guard.guard import INITIAL_GUARD, GuardParams, Received, guard_step
 from glider_guard.rows import HOLD, ORDERED, REACTIONS, reaction_of
 from glider_guard.rows import say as said_of
 from glider_guard.settings import GuardSettings
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import steers_by
 
-#: A change of what is told is told at most once in this time (ns).
+#: A change of what is reported is an event at most once in this time (ns).
 TELL_EVERY_NS = 1_000_000_000
 
 
@@ -23,7 +23,7 @@ TELL_EVERY_NS = 1_000_000_000
 def guard_tick(state, t_s, inputs, params, dt):
     """One tick: what `GUARD` reads in; command, drop_weight out; see `block_tick`."""
     demand, reference, odom, joints, health, battery, pressure, altitude = inputs
-    heard = Heard(
+    received = Received(
         demand=Joints(demand[0], demand[1], demand[2], demand[3]),
         odometry=odometry_from_wire(odom),
         joints=Joints(joints[0], joints[1], joints[2], joints[3]),
@@ -38,7 +38,7 @@ def guard_tick(state, t_s, inputs, params, dt):
     if state.tick > 0 and missed_s > dt:
         # before a silence, or a pause: as old as that, and what was gone meanwhile is no lag
         seen, depths = state.witness, state.depths
-        fallen = heard.odometry.p_d - state.taken.gate.odometry.p_d
+        fallen = received.odometry.p_d - state.taken.gate.odometry.p_d
         if not abs(fallen) <= params.depth.jump_m:  # that is set anew
             fallen = 0.0
         depths = replace(
@@ -48,7 +48,7 @@ def guard_tick(state, t_s, inputs, params, dt):
             astray_m=depths.astray_m + fallen,
         )
         state = replace(state, witness=replace(seen, own_s=seen.own_s + missed_s), depths=depths)
-    state, out = guard_step(state, heard, params, dt)
+    state, out = guard_step(state, received, params, dt)
     state = replace(state, t_s=t_s)
     command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)
     return state, (command, (1.0 if out.drops else 0.0,)), (out.reported,)

@@ -23,7 +23,7 @@ MEAN_S = 10.0
 AT_REST_M, AT_REST_SHARE = 1.0, 0.25
 #: One that is asked down goes farther than this many times the same depth, or hangs. It may swing.
 FARTHER = 4.0
-#: For longer than this (s) the depth lags behind the vertical rate before it is told.
+#: For longer than this (s) the depth lags behind the vertical rate before it is reported.
 LAG_S = 10.0
 #: The past of the lag fades with this time (s).
 LAG_FADES_S = 150.0
@@ -46,7 +46,7 @@ class DepthLimits(NamedTuple):
     climb_progress_m: float  #: upward, in a climb
     no_climb_s: float
     drop_after_s: float
-    drop_blind_s: float  #: the same where no depth is to be believed
+    drop_blind_s: float  #: the same where no depth is to be trusted
     climb_mps: float  #: slowest way up
     led_m: float  #: by pump and pitch, where the depth stays the same
     stalled_m: float
@@ -64,7 +64,7 @@ class DepthLimits(NamedTuple):
 class Depths(NamedTuple):
     """What is watched of the depth, between two ticks."""
 
-    depth: float  #: that is believed (m)
+    depth: float  #: that is trusted (m)
     target: float  #: deepest that was asked for so far (m)
     deep_s: float  #: time for which the vehicle has been too deep
     crush_s: float  #: deeper than its hull may bear, or about to be
@@ -103,8 +103,8 @@ class Sounding(NamedTuple):
     before: float  #: the same a tick before
     odom_rate: float  #: vertical rate of odom (m/s, + down)
     odom_speed: float  #: over ground, level (m/s)
-    depth: float  #: that is believed (m)
-    rate: float  #: vertical rate that is believed (m/s, + down)
+    depth: float  #: that is trusted (m)
+    rate: float  #: vertical rate that is trusted (m/s, + down)
     apart_m: float  #: between pressure and odom (m)
     is_same: bool  #: odom is what it was a tick before
     target: float  #: that guidance asks for (m)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The guard: what comes in, what it shows, and the command that goes out.
 
-It trusts nobody before it: what it is told is checked again, and an actuator, a sensor or another
+It trusts nobody before it: what comes in is checked again, and an actuator, a sensor or another
 block that fails is met with a reaction (`glider_guard.rows`) that needs none of them.
 """
 
@@ -55,7 +55,7 @@ from glider_model.onboard.gate import (
     INITIAL_GATE,
     GateParams,
     GateState,
-    are_believed,
+    are_plausible,
     gate_step,
     is_lost,
 )
@@ -66,7 +66,7 @@ TOO_MANY = 2
 
 
 class GuardParams(NamedTuple):
-    """Limits of a vehicle, and of what is believed."""
+    """Limits of a vehicle, and of what is plausible."""
 
     gate: GateParams
     actuators: ActuatorLimits
@@ -78,8 +78,8 @@ class GuardParams(NamedTuple):
     witness: WitnessLimits
 
 
-class Heard(NamedTuple):
-    """What a tick brings, as it is told."""
+class Received(NamedTuple):
+    """What a tick brings, as it comes."""
 
     demand: Joints  #: of control
     odometry: Odometry
@@ -96,7 +96,7 @@ _REST = Joints(0.0, 0.0, 0.0, 0.0)
 
 
 class Taken(NamedTuple):
-    """The last of it that could be believed, and the time since (s)."""
+    """The last of it that was plausible, and the time since (s)."""
 
     gate: GateState = INITIAL_GATE  #: odometry
     demand: Joints = _REST
@@ -136,22 +136,22 @@ class GuardOutput(NamedTuple):
 
 
 @kernel
-def _serves(heard, is_good, last, last_s, dt):
-    """What is heard, or what was before and the time since (s)."""
-    return (heard, 0.0) if is_good else (last, last_s + dt)
+def _serves(received, is_good, last, last_s, dt):
+    """What is received, or what was before and the time since (s)."""
+    return (received, 0.0) if is_good else (last, last_s + dt)
 
 
 @kernel
-def take_in(state, heard, params, dt):
-    """What is believed at this tick: `Taken`."""
+def take_in(state, received, params, dt):
+    """What counts at this tick: `Taken`."""
     limits = params.actuators.range
-    is_good = are_believed(heard.demand, limits)
-    demand, demand_s = _serves(heard.demand, is_good, state.demand, state.demand_s, dt)
-    is_good = are_believed(heard.joints, limits)
-    joints, joints_s = _serves(heard.joints, is_good, state.joints, state.joints_s, dt)
-    is_good = abs(heard.target) < 1e6
-    target, target_s = _serves(heard.target, is_good, state.target, state.target_s, dt)
-    gate = gate_step(state.gate, heard.odometry, params.gate, dt)
+    is_good = are_plausible(received.demand, limits)
+    demand, demand_s = _serves(received.demand, is_good, state.demand, state.demand_s, dt)
+    is_good = are_plausible(received.joints, limits)
+    joints, joints_s = _serves(received.joints, is_good, state.joints, state.joints_s, dt)
+    is_good = abs(received.target) < 1e6
+    target, target_s = _serves(received.target, is_good, state.target, state.target_s, dt)
+    gate = gate_step(state.gate, received.odometry, params.gate, dt)
     return Taken(
         gate=gate,
         demand=demand,
@@ -165,7 +165,7 @@ def take_in(state, heard, params, dt):
 
 @kernel
 def _intake_rows(taken, params):
-    """Rows of what is asked for, and of what is not heard any more."""
+    """Rows of what is asked for, and of what does not come any more."""
     hold_s = params.gate.hold_s
     lost = is_lost(taken.gate, params.gate) or taken.joints_s > hold_s or taken.target_s > hold_s
     reported = row(rows.ORDERED, taken.target <= SURFACE_TARGET) | row(rows.LOST, lost)
@@ -214,10 +214,10 @@ def _react(state, taken, reported, glide, is_same, witness, params, dt):
 
 
 @kernel
-def _sounding(state, taken, before, heard, shown, witness, last, reported, params):
+def _sounding(state, taken, before, received, shown, witness, last, reported, params):
     """What a tick tells of the depth: `Sounding`.
 
-    ``before`` is the odometry that was believed a tick before, ``last`` where the actuators were
+    ``before`` is the odometry that counted a tick before, ``last`` where the actuators were
     sent last, ``reported`` the rows that hold by now.
     """
     x, m_b, rate = taken.gate.odometry, taken.joints.m_b, witness.rate
@@ -232,7 +232,7 @@ def _sounding(state, taken, before, heard, shown, witness, last, reported, param
     ascends = last.m_b <= params.ascent.pumped
     ascends = ascends or (is_asked_up and last.m_b < min(0.0, neutral))
     is_afloat = witness.depth <= SURFACE_M
-    if heard.health.contact_age_s >= 0.0:
+    if received.health.contact_age_s >= 0.0:
         is_afloat = is_out(witness) or (
             witness.depth <= AFLOAT_M and not state.reported & rows.BLIND
         )
@@ -250,7 +250,7 @@ def _sounding(state, taken, before, heard, shown, witness, last, reported, param
         drop_way=sinks_on_m(rate, sinks, m_b, is_pumped, params.weight),
         led=led,
         sure=sure_share(state.weight, m_b, params.weight),
-        altitude=heard.altitude,
+        altitude=received.altitude,
         is_sent_up=last.m_b < max(0.0, neutral),
         ascends=ascends,
         surfaces=(state.reported & (rows.SURFACES | rows.DROPS)) != 0,
@@ -262,11 +262,11 @@ def _sounding(state, taken, before, heard, shown, witness, last, reported, param
 
 @kernel
 def guard_step(
-    state: GuardState, heard: Heard, params: GuardParams, dt: float
+    state: GuardState, received: Received, params: GuardParams, dt: float
 ) -> tuple[GuardState, GuardOutput]:
-    """One tick of the guard, of ``dt`` s; anything may be in what is heard."""
+    """One tick of the guard, of ``dt`` s; anything may be in what is received."""
     first = state.tick == 0
-    taken = take_in(state.taken, heard, params, dt)
+    taken = take_in(state.taken, received, params, dt)
     last = taken.joints if first else state.command
     before = taken.gate.odometry if first else state.taken.gate.odometry
     sent = _sent(last, taken.demand, state.reported)
@@ -278,10 +278,10 @@ def guard_step(
     attack, _ = glide_attacks(theta, theta, params.weight.polar)
     led, is_glide = led_rate(state.weight, theta, attack, m_b, params.weight)
     shown = Shown(
-        raw=heard.depth if params.has_pressure else heard.odometry.p_d,
+        raw=received.depth if params.has_pressure else received.odometry.p_d,
         odom=x.p_d,
         odom_before=before.p_d,
-        contact_age_s=heard.health.contact_age_s,
+        contact_age_s=received.health.contact_age_s,
         rate=rate,
         led=led,
         is_glide=is_glide,
@@ -291,14 +291,14 @@ def guard_step(
     if first:
         witness, depths = begin_watch(shown.raw, x.p_d), begin_at(x.p_d)
     witness, wrong = watch(witness, shown, sees, params.witness, dt)
-    at = _sounding(state, taken, before, heard, shown, witness, last, reported, params)
+    at = _sounding(state, taken, before, received, shown, witness, last, reported, params)
     depths = sound(depths, at, params.depth, dt)
     if sees and not at.surfaces and at.depth <= SURFACE_M and depths.led_m > params.depth.led_m:
         witness = replace(witness, depth=depths.led_m)  # it was led there, whatever is shown
     # without a depth, a leak alone is certain
     floods = (state.reported & (rows.LEAK | rows.TOO_HEAVY if sees else rows.LEAK)) != 0
     reported |= wrong | depth_rows(depths, at.surfaces, sees, floods, params.depth)
-    health, unwell = check_health(state.health, heard.health, heard.battery, params.health, dt)
+    health, bad = check_health(state.health, received.health, received.battery, params.health, dt)
     sinking = sinking_rate(depths) if sees else rate
     under = witness.depth > SURFACE_M
     glide = Glide(
@@ -313,8 +313,8 @@ def guard_step(
         under=under,
     )
     weight, heavy = weigh(state.weight, glide, params.weight, dt)
-    fixes = watch_fixes(state.fixes, heard.odometry, heard.known, dt)
-    reported |= unwell | heavy | fix_rows(fixes) | _intake_rows(taken, params)
+    fixes = watch_fixes(state.fixes, received.odometry, received.known, dt)
+    reported |= bad | heavy | fix_rows(fixes) | _intake_rows(taken, params)
     reported |= state.reported & rows.LATCHED
     ascent, command = _react(state, taken, reported, glide, shown.is_same, witness, params, dt)
     tick = state.tick + 1 if taken.gate.seen else 0

@@ -9,7 +9,7 @@ from glider_guard.rows import BATTERY, LEAK, NO_CONTACT, VACUUM, row
 
 
 class HealthLimits(NamedTuple):
-    """What is well."""
+    """What is healthy."""
 
     vacuum_min: float  #: (Pa)
     vacuum_max: float

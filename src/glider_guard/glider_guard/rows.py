@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the guard watches for, row by row, and what it does about it.
 
-A row is a bit of what is told. Rows that latch stay until a person clears them at the surface. The
-reaction of the vehicle is the gravest among the rows that are told.
+A row is a bit of the report. Rows that latch stay until a person clears them at the surface. The
+reaction of the vehicle is the gravest among the rows that are reported.
 """
 
 from typing import NamedTuple
@@ -54,7 +54,7 @@ def _stuck(bit: int, part: str, reaction: int) -> Row:
     )
 
 
-#: Every row, in the order in which they are told.
+#: Every row, in the order in which they are reported.
 ROWS = (
     _stuck(STUCK_BUOYANCY, 'buoyancy engine', SURFACE),
     _stuck(STUCK_PITCH, 'pitch mass', SURFACE),
@@ -226,14 +226,14 @@ ROWS = (
 
 @kernel
 def row(bit, holds):
-    """What is told of a row: its bit, if it holds."""
+    """What is reported of a row: its bit, if it holds."""
     return bit if holds else 0
 
 
 HOLDS, SURFACES, DROPS = (
     sum(row.bit for row in ROWS if row.reaction == one) for one in (HOLD, SURFACE, DROP)
 )
-#: While one of these holds the depth is not believed.
+#: While one of these holds the depth is not trusted.
 BLIND = FROZEN | LOST | DISAGREES | DEPTH_WRONG
 LATCHED = sum(row.bit for row in ROWS if row.latches)
 ALL = sum(row.bit for row in ROWS)

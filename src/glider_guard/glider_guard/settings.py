@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the guard, and what its kernel is told by them."""
+"""Settings of the guard, and the params of its kernel by them."""
 
 import math
 
@@ -134,7 +134,7 @@ class GuardLimitSettings(Settings):
 
 
 class GuardSettings(GuardLimitSettings):
-    """Everything the guard node is told."""
+    """Everything the guard node is set to."""
 
     vehicle: str = Field('zhang2021', description='vehicle: ranges and rates, depths, weight')
     pressure: bool = Field(False, description='there is a depth apart from that of odom')

@@ -28,7 +28,7 @@ ARRIVED = 0.05
 SOON_S = 30.0
 #: Water that comes in, and a hull that shrinks with depth, make a vehicle heavier all the way
 #: down. What a dive shows of it is a line over time, from when the glide is steady (s); after so
-#: long (s) it is believed, as far ahead as it is long, and bent by what is newer than this (s).
+#: long (s) it is used, as far ahead as it is long, and bent by what is newer than this (s).
 STEADY_S, LINE_S, NEWER_S = 300.0, 600.0, 1800.0
 #: What is more than this share of the range of the pump it cannot take off, though the polar errs,
 #: as it does most in a steep dive with the whole pump and a pitch that errs.
@@ -91,7 +91,7 @@ class Glide(NamedTuple):
     sinking: float  #: that of the depth, which may be noise (m/s, + down)
     m_b: float  #: where the pump is (kg)
     sent: float  #: where it was sent (kg)
-    depth: float  #: that is believed (m)
+    depth: float  #: that is trusted (m)
     target: float  #: that guidance asks for (m)
     under: bool  #: under water
 
@@ -175,7 +175,7 @@ def weigh(state: Weight, at: Glide, limits: WeightLimits, dt: float) -> tuple[We
 
     At the surface nothing glides. Twice the drag, as growth makes it, takes half of the speed's
     square from a climb: what the vehicle still rises by is taken off again. In a dive it is
-    told, too, where at the end of it the pump could not take off what it weighs.
+    reported, too, where at the end of it the pump could not take off what it weighs.
     """
     off, soon, least, line, growth = state.off, state.soon, state.least, state.line, state.growth
     begun, line_s, glides, shown = state.begun, 0.0, 0.0, 0.0

@@ -1,11 +1,11 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which depth can be believed: a witness that is no depth, and 0 at the surface.
+"""Which depth can be trusted: a witness that is no depth, and 0 at the surface.
 
 Pump, pitch and glide polar say how fast the vehicle must sink. A depth that shows the same number
 to the last bit for long, under water or while they lead the vehicle away, is no measurement; nor
 is one that jumps and stays there. With the antenna out of the water the depth is 0: what is shown
-there is its offset, which is taken off, or too large to be one. Where the depth is not believed,
+there is its offset, which is taken off, or too large to be one. Where the depth is not trusted,
 it is reckoned by pump, pitch and polar from the last one that was.
 """
 
@@ -17,9 +17,9 @@ from glider_guard.rows import DEPTH_OFFSET, DEPTH_WRONG, FROZEN
 #: Above this the vehicle is at the surface, and nothing of its depth is watched (m).
 SURFACE_M = 5.0
 #: Above this it is afloat, and its antenna may be out (m): one that surfaces for good hangs where
-#: it is deeper, and nobody is heard.
+#: it is deeper, and no contact is made.
 AFLOAT_M = 2.0
-#: Somebody was heard within this time (s): the antenna is out of the water.
+#: There was a contact within this time (s): the antenna is out of the water.
 HEARD_S = 1.0
 #: With the antenna out for so long (s) the vehicle is at the surface; a depth shown there is
 #: averaged over the second time (s).
@@ -35,7 +35,7 @@ FARTHEST_M = 1e6
 
 
 class WitnessLimits(NamedTuple):
-    """What of a depth is believed."""
+    """What of a depth is trusted."""
 
     same_s: float  #: the same sample for so long is none
     is_rough: bool  #: measured in steps: the same sample is natural where the vehicle hardly moves
@@ -72,8 +72,8 @@ class Witness(NamedTuple):
     out_s: float  #: antenna out of the water, without a break
     own_zero: float  #: what the sensor shows at the surface (m)
     odom_zero: float  #: what odom shows there
-    depth: float  #: that is believed (m)
-    rate: float  #: vertical rate that is believed, averaged (m/s, + down)
+    depth: float  #: that is trusted (m)
+    rate: float  #: vertical rate that is trusted, averaged (m/s, + down)
     apart_m: float  #: between the two that are measured (m)
 
 
@@ -104,7 +104,7 @@ def _averaged(zero, shown, before, jump_m, dt):
 
 @kernel
 def is_out(state):
-    """Whether the vehicle is at the surface for certain: its antenna is heard."""
+    """Whether the vehicle is at the surface for certain: its antenna has contact."""
     return state.out_s > OUT_S
 
 
@@ -114,7 +114,7 @@ def watch(
 ) -> tuple[Witness, int]:
     """Take in what a tick shows; also the rows that hold.
 
-    ``sees`` says whether the depth has been believed so far.
+    ``sees`` says whether the depth has been trusted so far.
     """
     reported, raw = 0, shown.raw
     is_one = abs(raw) < FARTHEST_M
@@ -157,7 +157,7 @@ def watch(
         rate = shown.rate if limits.has_rate and not shown.is_same else shown.led
         depth = 0.0 if out_s > OUT_S else max(0.0, state.depth + dt * rate)
     elif reported & (FROZEN | DEPTH_WRONG):
-        # the last that was believed, and what has been gone since
+        # the last that was trusted, and what has been gone since
         depth = 0.0 if out_s > OUT_S else max(0.0, state.depth + (led_m if same_s > 0.0 else 0.0))
     rate = state.rate + dt / RATE_S * (rate - state.rate)
     return Witness(

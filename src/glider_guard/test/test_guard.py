@@ -19,7 +19,7 @@ from glider_guard import rows
 from glider_guard.actuators import INITIAL_FOLLOWERS, follow
 from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
 from glider_guard.block import GUARD, guard_surface, say
-from glider_guard.guard import GuardOutput, GuardParams, GuardState, Heard, guard_step
+from glider_guard.guard import GuardOutput, GuardParams, GuardState, Received, guard_step
 from glider_guard.settings import GuardSettings
 from glider_model.ocean.density import pressure_at
 from glider_model.onboard.glide_polar import glide_vertical_rate
@@ -41,7 +41,7 @@ class Flight(NamedTuple):
     rate: float  #: vertical (m/s, + down)
     joints: Joints  #: after the first tick
     follows: bool  #: its actuators are where they were sent instead
-    says_where: bool  #: it tells its own odometry, not the one that is heard
+    says_where: bool  #: it tells its own odometry, not the one that is received
     says_depth: bool  #: it tells its own depth
 
 
@@ -68,8 +68,8 @@ def fly_on(state, out, where, ticks, flight, at, params, dt):
     for _ in range(ticks):
         odometry = seen_at(where, flight.rate, flight.pitch) if flight.says_where else at.odometry
         depth = where.depth if flight.says_depth else at.depth
-        heard = replace(at, odometry=odometry, depth=depth, joints=where.joints)
-        state, out = guard_step(state, heard, params, dt)
+        received = replace(at, odometry=odometry, depth=depth, joints=where.joints)
+        state, out = guard_step(state, received, params, dt)
         joints = out.command if flight.follows else flight.joints
         where = Where(max(0.0, where.depth + dt * flight.rate), where.time_s + dt, joints)
     return state, out, where
@@ -93,17 +93,17 @@ class Vehicle:
     def _where(self) -> Where:
         return Where(float(self.depth), self.time_s, self.joints)
 
-    def go(self, seconds: float, demand=DIVES, rate: float = RATE, joints=None, **heard) -> int:
+    def go(self, seconds: float, demand=DIVES, rate: float = RATE, joints=None, **received) -> int:
         """Fly on; rows at the end. Without ``joints`` actuators are where they were sent."""
         known = (self.target, float(self.depth), NO_ECHO, WELL, POWER)
-        at = Heard(demand, self.odometry(rate), self.joints, *known)._replace(**heard)
+        at = Received(demand, self.odometry(rate), self.joints, *known)._replace(**received)
         flight = Flight(
             pitch=math.radians(self.pitch_deg),
             rate=float(rate),
             joints=joints or self.joints,
             follows=joints is None,
-            says_where='odometry' not in heard,
-            says_depth='depth' not in heard,
+            says_where='odometry' not in received,
+            says_depth='depth' not in received,
         )
         ticks, where = round(seconds / TICK_S), self._where()
         self.state, self.out, where = fly_on(
@@ -246,9 +246,9 @@ def test_the_weight_goes_when_nothing_else_helps_and_not_before():
 
 
 def test_a_depth_that_is_frozen_is_no_reason_to_drop_the_weight_at_once():
-    """From 100 m it has 1200 s, and 667 s at 0.15 m/s; who is heard has come up."""
-    vehicle, heard = Vehicle(), Vehicle()
-    for one, age_s, dropped in ((vehicle, 100.0, True), (heard, 0.0, False)):
+    """From 100 m it has 1200 s, and 667 s at 0.15 m/s; who has contact has come up."""
+    vehicle, received = Vehicle(), Vehicle()
+    for one, age_s, dropped in ((vehicle, 100.0, True), (received, 0.0, False)):
         one.go(1.0)
         frozen, health = one.odometry(0.0), WELL._replace(contact_age_s=age_s)
         assert one.go(1700.0, odometry=frozen) & rows.FROZEN
@@ -264,7 +264,7 @@ def test_a_depth_that_is_frozen_is_no_reason_to_drop_the_weight_at_once():
 def test_who_hangs_just_below_the_surface_and_is_not_heard_lets_the_weight_go(
     depth_m, age_s, drops
 ):
-    """Neither one that is heard does, nor one that nobody could hear, nor one that is afloat."""
+    """Neither one that has contact does, nor one that could have none, nor one afloat."""
     vehicle, health = Vehicle(depth_m=depth_m), WELL._replace(contact_age_s=age_s)
     vehicle.target = SURFACE_TARGET
     vehicle.go(1200.0, rate=0.0, health=health)
@@ -601,7 +601,7 @@ def test_whatever_it_hears_the_command_is_within_the_ranges(numbers, ticks):
     vehicle.go(1.0)
     demand, joints, odometry = Joints(*numbers[:4]), Joints(*numbers[4:8]), numbers[8:21]
     told = (*numbers[21:24], Health(*numbers[24:27]), Battery(*numbers[27:]))
-    at = Heard(demand, Odometry(*odometry), joints, *told)
+    at = Received(demand, Odometry(*odometry), joints, *told)
     state = vehicle.state
     most = Joints(*(1.5 * limit for limit in vehicle.params.actuators.range))
     for _ in range(ticks):

@@ -97,7 +97,7 @@ class GuidanceParams(NamedTuple):
     method: NamedTuple  #: of the method that was chosen
     end_s: float  #: when the mission ends (s)
     ends_with_path: bool  #: comes up at the end of the path, and stays there
-    no_progress_surfacings: int  #: so many without progress are told; 0: none are
+    no_progress_surfacings: int  #: so many without progress are reported; 0: none are
     target_gain: float  #: delta1 (1/s)
     observer: ObserverParams
     heading_filter: FilterParams
@@ -192,7 +192,7 @@ def guidance_abort(state):
 
 @kernel
 def hear_fixes(state, odometry, known, dt):
-    """The state after odometry, its place known by a `Covariance`, is heard for fixes."""
+    """The state after odometry, its place known by a `Covariance`, is searched for fixes."""
     return replace(state, fixes=watch_fixes(state.fixes, odometry, known, dt))
 
 

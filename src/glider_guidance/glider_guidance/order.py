@@ -16,7 +16,7 @@ ALONE, TOGETHER = ('hold', 'resume', 'abort'), ('path', 'depth_m', 'pitch_deg', 
 
 
 class Order(Settings):
-    """What a vehicle is told in flight, and when."""
+    """What a vehicle is ordered in flight, and when."""
 
     at_s: float = number(..., (0.0, 1e8), 'time from which it holds (s)')
     when: Literal['once', 'surfacing'] = Field(

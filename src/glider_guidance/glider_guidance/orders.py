@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""The orders of a flight: what guidance is told by each, and when it holds.
+"""The orders of a flight: what guidance does by each, and when it holds.
 
 Whoever has them flies again to the same bits: the direct engine stops at their ticks, the guidance
 node sets its parameters there, which is on record.
@@ -22,7 +22,7 @@ from glider_guidance.yo.stage import AT_END_OF_PATH, SURFACE_PREPARATION, WAITIN
 
 
 def changed(settings: GuidanceSettings, order: Order) -> GuidanceSettings:
-    """What guidance is told when an order holds.
+    """What guidance is set to when an order holds.
 
     A ConfigurationError names the order, and why it makes no sense.
     """

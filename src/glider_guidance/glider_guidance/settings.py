@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of guidance, and what the kernels are told by them."""
+"""Settings of guidance, and the kernels' params by them."""
 
 import math
 import zlib
@@ -144,7 +144,7 @@ class GuidanceLawSettings(_MethodGains):
 
 
 class GuidanceSettings(GuidanceLawSettings):
-    """Everything the guidance node is told."""
+    """Everything the guidance node is set to."""
 
     vehicle: str = Field('zhang2021', description='vehicle whose glide polar and pump are used')
     path: PathSettings = Field(

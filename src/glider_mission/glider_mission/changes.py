@@ -37,7 +37,7 @@ def given_fields(fields: Any, argument: str = 'set') -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """A value without arrays: numbers and lists are told as others are."""
+    """A value without arrays: numbers and lists are shown as others are."""
     if isinstance(value, dict):
         return {name: plain(inner) for name, inner in value.items()}
     if isinstance(value, list | tuple):

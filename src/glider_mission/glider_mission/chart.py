@@ -88,7 +88,7 @@ def stretch(latitude: float, origin: Origin) -> float:
 def in_metres(path: Any, settings: OriginSettings | None) -> Any:
     """A path as a person wrote it, with waypoints in metres if it has them in degrees.
 
-    Without an origin, where the one that was told is refused, it is their middle.
+    Without an origin, where the one that was given is refused, it is their middle.
     A ValueError names a waypoint that is none, or at which the chart is too far off.
     """
     if not isinstance(path, dict) or path.get('waypoints_latlon') is None:

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files are written whole or not at all, and a disk that takes no more is told as such."""
+"""Files are written whole or not at all, and a disk that takes no more is named as such."""
 
 import errno
 import os

@@ -78,7 +78,7 @@ DEFAULT_SCENARIO = 'current_8deg'
 AMPLE = 1.25
 #: A straight way is looked at at so many places, whether it leads over land.
 ALONG = 2000
-#: The farthest that a belief may jump at a fix (m).
+#: The farthest that an estimate may jump at a fix (m).
 JUMP_M = 1e8
 
 #: A run of this simulated time or more is a long one, with the longer settling time (s).
@@ -112,7 +112,7 @@ class RouteForecast(Settings):
 class Scenario(Settings):
     """A mission: vehicle, water, path, profile, current, guidance, control, and its end."""
 
-    #: What the control node is told, as a type: it knows the same laws.
+    #: Settings of the control node, as a type: it knows the same laws.
     control_kind: ClassVar[type[ControlSettings]] = ControlSettings
 
     name: str = Field(
@@ -239,7 +239,7 @@ class Scenario(Settings):
         return [fault for fault in self.faults if isinstance(fault, Message)]
 
     def plant_settings(self) -> PlantSettings:
-        """What the plant node is told."""
+        """Settings of the plant node."""
         chart = self.bathymetry
         return _settings_of(
             PlantSettings,
@@ -261,12 +261,12 @@ class Scenario(Settings):
 
     @property
     def _holds(self) -> bool:
-        """Whether the vehicle is told to hold: such a mission ends by its time alone."""
+        """Whether the vehicle is ordered to hold: such a mission ends by its time alone."""
         return any(order.hold for order in self.orders)
 
     @property
     def shallowest_m(self) -> float:
-        """Depth of the shallowest dives that it is told to make, over a flat bottom (m)."""
+        """Depth of the shallowest dives that it is ordered to make, over a flat bottom (m)."""
         depths, profile = [one.depth_m for one in self.orders if one.depth_m], self.profile
         if profile.clearance_m and self.water.bottom_m and not self.bathymetry.file:
             depths.append(max(profile.top_depth_m, self.water.bottom_m - profile.clearance_m))
@@ -280,7 +280,7 @@ class Scenario(Settings):
         return SURFACE_S + (self._stay_s() if self.profile.surface_every_dives else 0.0)
 
     def current_settings(self) -> CurrentSettings:
-        """What the current node is told: directions absolute, the scenario's seed."""
+        """Settings of the current node: directions absolute, the scenario's seed."""
         resolved = self.resolved_current(self.current)
         return resolved.model_copy(update={'seed': self.seed})
 
@@ -332,37 +332,37 @@ class Scenario(Settings):
         return speed * math.cos(direction), speed * math.sin(direction)
 
     def navigation_settings(self) -> NavigationSettings:
-        """What the navigation node is told."""
+        """Settings of the navigation node."""
         sources = self.navigation, self.initial, self.sensors, self
         forecast = self.resolved_current(self.navigation.forecast)
         return _settings_of(NavigationSettings, *sources, forecast=forecast)
 
     def guidance_settings(self) -> GuidanceSettings:
-        """What the guidance node is told."""
+        """Settings of the guidance node."""
         altitude, gate = 'altitude' in self.topics, self._gate(self.guidance)
         return _settings_of(GuidanceSettings, self.guidance, self, altitude=altitude, gate=gate)
 
     def _gate(self, law: GuidanceLawSettings | ControlLawSettings | GuardLimitSettings):
-        """Gate of a law that is told where the vehicle believes it is.
+        """Gate of a law that gets the estimated place.
 
-        A belief may jump at a fix as far as it was off: that is no fault, unless somebody said so.
+        It may jump at a fix as far as it was off: that is no fault, unless somebody said so.
         """
         if not self.navigation.jumps or law.gate.position_jump_m != GateSettings().position_jump_m:
             return law.gate
         return law.gate.model_copy(update={'position_jump_m': JUMP_M})
 
     def control_settings(self) -> ControlSettings:
-        """What the control node is told."""
+        """Settings of the control node."""
         return _settings_of(self.control_kind, self.control, self, gate=self._gate(self.control))
 
     def guard_settings(self) -> GuardSettings:
-        """What the guard node is told."""
+        """Settings of the guard node."""
         has = {name: name in self.topics for name in ('pressure', 'altitude')}
         gate = self._gate(self.guard)
         return _settings_of(GuardSettings, self.guard, self.sensors, self, gate=gate, **has)
 
     def block_settings(self) -> tuple[Settings, ...]:
-        """What the node of each block is told, in the order of `glider_mission.blocks`."""
+        """Settings of the node of each block, in the order of `glider_mission.blocks`."""
         return (
             self.plant_settings(),
             self.current_settings(),
@@ -410,7 +410,7 @@ class Scenario(Settings):
     def _pace_s(self, settings: GuidanceSettings) -> float:
         """Time (s) that is ample for a metre of its path and its stays, in still water.
 
-        That is by what guidance is told at one time.
+        That is by what guidance is set to at one time.
         """
         params, every = settings.params(), self.profile.surface_every_dives
         time_s = path_time_s(params, 0.0, 0.0)
@@ -422,7 +422,7 @@ class Scenario(Settings):
         return AMPLE * time_s / params.path.ways[-1]
 
     def _in_turn(self) -> list[GuidanceSettings]:
-        """What guidance is told by its mission, and then by each order."""
+        """Settings of guidance by its mission, and then by each order."""
         orders = sorted(self.orders, key=lambda one: one.tick)
         return list(accumulate(orders, changed, initial=self.guidance_settings()))
 
@@ -437,7 +437,7 @@ class Scenario(Settings):
         return held_s if math.isinf(since_s) else math.inf
 
     def _stay_s(self) -> float:
-        """Time (s) of the longest stay at the surface."""
+        """Time (s) of the longest surface interval."""
         waits_s = (one.wait_s or 0.0 for one in self.orders)
         return max([self.profile.wait_s, *waits_s]) + self.profile.prepare_s
 
@@ -472,7 +472,7 @@ class Scenario(Settings):
 
 
 def _settings_of(kind: type[SettingsT], *sources: Settings, **given: Any) -> SettingsT:
-    """Settings of a kind: what is told, else what the first of the sources has by that name."""
+    """Settings of a kind: what is set, else what the first of the sources has by that name."""
     for source in sources:
         names = type(source).model_fields.keys() & kind.model_fields.keys() - given.keys()
         given |= {name: getattr(source, name) for name in names}

@@ -32,7 +32,7 @@ STEEP = 1.0
 REPEATED_S = 60.0
 #: Time constants with which roll and pitch follow the moving mass (s).
 ROLL_S, PITCH_S = 2.0, 2.0
-#: Time constant with which differences of samples are believed as rates (s).
+#: Time constant with which differences of samples count as rates (s).
 RATE_S = 2.0
 
 

@@ -16,7 +16,7 @@ from glider_base.wiring import NAVIGATION as WIRED
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import steers_by
 from glider_navigation.intake import is_blind, is_refusing, take_in
-from glider_navigation.method import Fix, Heard, method_step
+from glider_navigation.method import Fix, Received, method_step
 from glider_navigation.phase import KNOWN, PHASE_NAMES
 from glider_navigation.settings import NavigationParams, NavigationSettings, NavigationState
 
@@ -29,7 +29,7 @@ def _hear(inputs, origin):
     """What the sensors say, from the numbers of their topics."""
     joints, odom, imu, pressure, fix = inputs[0], inputs[1], inputs[2], inputs[3], inputs[4]
     p_n, p_e = from_geodetic(fix[1], fix[2], origin)
-    return Heard(
+    return Received(
         joints=Joints(joints[0], joints[1], joints[2], joints[3]),
         odom=(  # of a recording it is an array
             odom[0],
@@ -57,22 +57,22 @@ def _hear(inputs, origin):
 @block_tick.body(NavigationParams)
 @kernel
 def navigation_tick(state, t_s, inputs, params, dt):
-    """One tick: sensors in; odom and what is believed of the current out; see `block_tick`."""
-    intake, heard = take_in(state.intake, _hear(inputs, params.origin), params.intake, dt)
-    method, believed = method_step(state.method, heard, params.method, dt)
-    odom = believed.odom
+    """One tick: sensors in; odom and the estimated current out; see `block_tick`."""
+    intake, received = take_in(state.intake, _hear(inputs, params.origin), params.intake, dt)
+    method, estimated = method_step(state.method, received, params.method, dt)
+    odom = estimated.odom
     if is_blind(intake, params.intake):
         odom = odom[:3] + NO_ATTITUDE + odom[7:]
     outputs = (
-        odom + covariance_to_wire(believed.place),
-        horizontal_to_wire(believed.current, believed.current_covariance),
-        horizontal_to_wire(believed.surface, believed.surface_covariance),
+        odom + covariance_to_wire(estimated.place),
+        horizontal_to_wire(estimated.current, estimated.current_covariance),
+        horizontal_to_wire(estimated.surface, estimated.surface_covariance),
     )
-    return NavigationState(intake, method), outputs, (believed.phase, int(is_refusing(intake)))
+    return NavigationState(intake, method), outputs, (estimated.phase, int(is_refusing(intake)))
 
 
 def say(phase: int, refused: int) -> Said:
-    """Where the vehicle is between two fixes, and whether a sensor is not believed."""
+    """Where the vehicle is between two fixes, and whether a sensor is refused."""
     values = {'phase': PHASE_NAMES[phase], 'refused': str(bool(refused)).lower()}
     if refused:
         message = f'{PHASE_NAMES[phase]}; refused a measurement, the last good one serves'

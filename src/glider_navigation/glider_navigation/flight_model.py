@@ -3,7 +3,7 @@
 """How fast the vehicle goes through the water, by pitch, and by pressure or net weight.
 
 U_h = w / tan(theta - alpha(theta)) by the glide polar holds in a steady glide, and so does the
-speed at which its drag carries a net weight. In a turn-over, where pitch and vertical rate (or
+speed at which its drag carries a net weight. In an inflection, where pitch and vertical rate (or
 weight) do not belong together, the last speed is held, and fades.
 
 What depth is shown at the surface, with a fix, is the offset of its sensor: a receiver has one

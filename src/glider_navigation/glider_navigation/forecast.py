@@ -25,7 +25,7 @@ from glider_model.ocean.field import Mission
 
 #: Levels of a mean over depth.
 _LEVELS = 5
-#: No more of a forecast is believed than this share.
+#: No more of a forecast is used than this share.
 MOST_SHARE = 1.5
 
 
@@ -67,23 +67,23 @@ class ForecastSettings(SumOfCurrents):
 class Forecast(NamedTuple):
     """A forecast as the kernels see it; nothing in it is a forecast of still water."""
 
-    is_believed: bool
+    is_used: bool
     params: CurrentParams
     nothing: CurrentState  #: no part of it remembers anything
     late_s: float = 0.0  #: age (s)
 
 
 class Trust(NamedTuple):
-    """What share of a forecast is believed."""
+    """What share of a forecast is used."""
 
     share: float
     variance: float  #: of it
 
 
-def make_forecast(settings: ForecastSettings, is_believed: bool) -> Forecast:
+def make_forecast(settings: ForecastSettings, is_used: bool) -> Forecast:
     """Forecast of some settings, or of none."""
-    params = (settings if is_believed else ForecastSettings()).params()
-    return Forecast(is_believed, params, CurrentState(0, np.zeros(0)), 3600.0 * settings.late_h)
+    params = (settings if is_used else ForecastSettings()).params()
+    return Forecast(is_used, params, CurrentState(0, np.zeros(0)), 3600.0 * settings.late_h)
 
 
 @kernel
@@ -94,7 +94,7 @@ def forecast_at(forecast, place, depth, deepest, t_s):
     """
     v_n, v_e = 0.0, 0.0
     levels = _LEVELS if deepest > 0.0 else 1
-    for k in range(levels if forecast.is_believed else 0):
+    for k in range(levels if forecast.is_used else 0):
         at = depth if levels == 1 else (k + 0.5) / levels * deepest
         position, then_s = (place.n, place.e, at), t_s - forecast.late_s
         _, water = current_step_in_place(
@@ -107,9 +107,9 @@ def forecast_at(forecast, place, depth, deepest, t_s):
 
 @kernel
 def weigh(trust, off, change, variance):
-    """What share of a forecast is believed after a way; ``trust`` is that before it.
+    """What share of a forecast is used after a way; ``trust`` is that before it.
 
-    ``off`` is the mean current over the way less what was believed (m/s), and ``variance`` that of
+    ``off`` is the mean current over the way less its estimate (m/s), and ``variance`` that of
     its north and of its east part, were the share known (m^2/s^2). ``change`` is the mean of the
     forecast over the way less that of the way before (m/s).
     """

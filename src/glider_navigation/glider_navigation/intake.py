@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What navigation takes in: what a sensor cannot have measured is refused, its last sample serves.
 
-A sensor that shows nothing that can be believed for longer than ``hold_s`` and a sampling period
+A sensor that shows nothing plausible for longer than ``hold_s`` and a sampling period
 is lost. Without attitude or depth there is no odometry: what is published then has no attitude (a
 quaternion of zeros), which nobody after navigation takes for one, and the guard brings the
 vehicle up. Whether a fix lies where the vehicle can be is for the method to say. A driver may go
@@ -19,16 +19,16 @@ from glider_model.onboard.gate import (
     NORM_REFUSED,
     GateParams,
     GateState,
-    are_believed,
+    are_plausible,
     gate_step,
     has_turned,
     is_slow,
     norm2,
     scaled,
 )
-from glider_navigation.method import Fix, Heard
+from glider_navigation.method import Fix, Received
 
-#: A refusal is told for so long (s), lest every sample of a sensor that fails is an event.
+#: A refusal is reported for so long (s), lest every sample of a sensor that fails is an event.
 REFUSAL_SHOWN_S = 2.0
 #: A fix that is the same to the last digit though the vehicle went down so far (m) is an old one.
 REPEATED_M = 1.0
@@ -39,7 +39,7 @@ DEPTH_MAX_M = 12000.0
 
 
 class IntakeParams(NamedTuple):
-    """What is believed."""
+    """What is plausible."""
 
     gate: GateParams
     range: Joints  #: of the actuators
@@ -49,7 +49,7 @@ class IntakeParams(NamedTuple):
 
 
 class IntakeState(NamedTuple):
-    """The last that was believed, and the time since (s)."""
+    """The last that was plausible, and the time since (s)."""
 
     odometry: GateState = INITIAL_GATE
     joints: Joints = Joints(0.0, 0.0, 0.0, 0.0)
@@ -57,7 +57,7 @@ class IntakeState(NamedTuple):
     imu_s: float = 0.0
     depth: float = 0.0
     depth_s: float = 0.0
-    fix: Fix = _NO_FIX  #: the last that was heard, or none
+    fix: Fix = _NO_FIX  #: the last that came, or none
     fix_depth: float = 0.0  #: the least there was since then (m)
     fix_is_old: bool = False  #: it has gone down with it
     seen: bool = False  #: there has been an attitude
@@ -79,18 +79,18 @@ def _is_fix(fix):
 
 @kernel
 def take_in(
-    state: IntakeState, heard: Heard, params: IntakeParams, dt: float
-) -> tuple[IntakeState, Heard]:
+    state: IntakeState, received: Received, params: IntakeParams, dt: float
+) -> tuple[IntakeState, Received]:
     """Take in what the sensors say at a tick of ``dt`` s; anything may be in it.
 
-    What comes out has numbers that can be worked with; its ``odom`` is as it was heard.
+    What comes out has numbers that can be worked with; its ``odom`` is as it came.
     """
-    odometry = gate_step(state.odometry, heard.odometry, params.gate, dt)
+    odometry = gate_step(state.odometry, received.odometry, params.gate, dt)
     refused = params.reads_odometry and odometry.age_s > 0.0
-    joints = heard.joints
-    if not are_believed(joints, params.range):
+    joints = received.joints
+    if not are_plausible(joints, params.range):
         joints, refused = state.joints, True
-    imu, imu_s, seen = heard.imu, state.imu_s + dt, state.seen
+    imu, imu_s, seen = received.imu, state.imu_s + dt, state.seen
     good = _is_plausible(imu, params.gate)
     if good and seen and imu_s <= params.hold_s:
         good = not has_turned(imu, state.imu, params.gate)
@@ -98,7 +98,7 @@ def take_in(
         imu, imu_s, seen = scaled(imu), 0.0, True
     else:
         imu, refused = state.imu, refused or params.reads_attitude
-    depth, depth_s, sounded = heard.depth, state.depth_s + dt, state.sounded
+    depth, depth_s, sounded = received.depth, state.depth_s + dt, state.sounded
     good = abs(depth) <= DEPTH_MAX_M
     if good and sounded and depth_s <= params.hold_s:
         good = abs(depth - state.depth) <= params.gate.depth_jump
@@ -106,7 +106,7 @@ def take_in(
         depth_s, sounded = 0.0, True
     else:
         depth, refused = state.depth, refused or params.reads_attitude
-    fix, said = heard.fix, state.fix
+    fix, said = received.fix, state.fix
     if fix.is_fix and not _is_fix(fix):
         fix, refused = _NO_FIX, True
     fix_depth, fix_is_old = depth, False
@@ -116,11 +116,11 @@ def take_in(
     said = fix
     if fix_is_old:
         fix = _NO_FIX
-    altitude = heard.altitude if math.isfinite(heard.altitude) else 0.0
+    altitude = received.altitude if math.isfinite(received.altitude) else 0.0
     refused_s = 0.0 if refused else state.refused_s + dt
-    taken = Heard(
+    taken = Received(
         joints=joints,
-        odom=heard.odom,
+        odom=received.odom,
         odometry=odometry.odometry,
         imu=imu,
         depth=depth,

@@ -26,7 +26,7 @@ class Start(NamedTuple):
     p_e: float
     imu_period_s: float
     gyro: bool
-    current: str  #: how the current is to be believed
+    current: str  #: how the current is to be estimated
     forecast: 'ForecastSettings'  #: of it
 
 
@@ -40,7 +40,7 @@ class NavigationMethodSettings(Settings):
 
     #: Topics of sensors that it needs, of `glider_base.wiring.SENSORS`.
     reads: ClassVar[tuple[str, ...]] = ()
-    #: Topics that it fills beside odom, of `glider_base.wiring.BELIEFS`.
+    #: Topics that it fills beside odom, of `glider_base.wiring.ESTIMATES`.
     tells: ClassVar[tuple[str, ...]] = ()
 
     def params(self, start: Start) -> NamedTuple:
@@ -61,7 +61,7 @@ class Fix(NamedTuple):
     variance: float  #: north and east each (m^2)
 
 
-class Heard(NamedTuple):
+class Received(NamedTuple):
     """What the sensors say at a tick; zero for what is not fitted.
 
     A sensor that is sampled less often shows its last sample again.
@@ -69,15 +69,15 @@ class Heard(NamedTuple):
 
     joints: Joints
     odom: tuple[float, ...]  #: measured_odom as on the wire, whatever is in it
-    odometry: Odometry  #: the same, as far as it can be believed
+    odometry: Odometry  #: the same, as far as it is plausible
     imu: Imu
     depth: float  #: (m)
     fix: Fix
     altitude: float  #: height over the bottom (m); 0.0: no echo
 
 
-class Believed(NamedTuple):
-    """What navigation believes."""
+class Estimate(NamedTuple):
+    """What navigation estimates."""
 
     odom: tuple[float, ...]  #: odometry as on the wire
     place: Covariance  #: of its horizontal position (m^2)
@@ -92,9 +92,9 @@ NONE = Covariance(0.0, 0.0, 0.0)
 
 
 @slot
-@returns('state after the tick', 'Believed')
-def method_step(state, heard, params, dt):
+@returns('state after the tick', 'Estimate')
+def method_step(state, received, params, dt):
     """One tick of a navigation method, of ``dt`` s, by the type of its params.
 
-    They are those of `NavigationMethodSettings.params`; what it has ``heard`` is a `Heard`.
+    They are those of `NavigationMethodSettings.params`; what it has received is a `Received`.
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of navigation, and what the kernels are told by them."""
+"""Settings of navigation, and the kernels' params by them."""
 
 from typing import Literal, NamedTuple
 
@@ -11,7 +11,7 @@ from glider_base import plugins
 from glider_base.frames import Origin, OriginSettings
 from glider_base.settings import Settings, derived, number
 from glider_base.slot import usable
-from glider_base.wiring import BELIEFS, SENSORS
+from glider_base.wiring import ESTIMATES, SENSORS
 from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.actuators import ranges
 from glider_model.vehicle.file import load_vehicle
@@ -27,10 +27,10 @@ TAKEN |= {'imu_period_s', 'gyro', 'also_fitted'}
 
 def _check_topics(name: str, method: type[NavigationMethodSettings]) -> None:
     """Refuse a method that reads or tells what there is not."""
-    if others := {*method.reads} - {*SENSORS} | {*method.tells} - {*BELIEFS}:
+    if others := {*method.reads} - {*SENSORS} | {*method.tells} - {*ESTIMATES}:
         raise ValueError(
             f'it reads or tells {", ".join(sorted(others))} (allowed: to read '
-            f'{", ".join(SENSORS)}; to tell {", ".join(BELIEFS)})'
+            f'{", ".join(SENSORS)}; to tell {", ".join(ESTIMATES)})'
         )
 
 
@@ -79,12 +79,12 @@ class NavigationLawSettings(_MethodChoice):
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Topics of sensors and beliefs that there are in a run."""
+        """Topics of sensors and estimates that there are in a run."""
         return (*self.chosen.reads, *self.chosen.tells)
 
     @property
     def jumps(self) -> bool:
-        """Whether what is believed may jump, as it does at a fix."""
+        """Whether what is estimated may jump, as it does at a fix."""
         return 'fix' in self.chosen.reads
 
     @property
@@ -95,7 +95,7 @@ class NavigationLawSettings(_MethodChoice):
 
 
 class NavigationSettings(NavigationLawSettings):
-    """Everything the navigation node is told."""
+    """Everything the navigation node is set to."""
 
     vehicle: str = Field('zhang2021', description='vehicle whose glide polar is used')
     origin: OriginSettings = Field(
@@ -111,7 +111,7 @@ class NavigationSettings(NavigationLawSettings):
 
     @property
     def topics(self) -> tuple[str, ...]:
-        """Topics of sensors and beliefs that there are in a run."""
+        """Topics of sensors and estimates that there are in a run."""
         return tuple(dict.fromkeys((*super().topics, *self.also_fitted)))
 
     @property

@@ -14,14 +14,14 @@ from glider_model.ocean.density import SURFACE_PRESSURE
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import load_vehicle
 from glider_navigation.block import navigation_tick
-from glider_navigation.current_belief import Uncertainty, initial_belief
+from glider_navigation.current_estimate import Uncertainty, initial_estimate
 from glider_navigation.forecast import ForecastSettings, Trust, forecast_at, make_forecast, weigh
 from glider_navigation.intake import is_refusing, take_in
-from glider_navigation.method import Fix, Heard, method_step
+from glider_navigation.method import Fix, Received, method_step
 from glider_navigation.methods.dead_reckoned import Way, _dive, _unforeseen, place_covariance
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
 from glider_navigation.settings import NavigationSettings
-from glider_navigation.surface_stay import begin, drifted_variance, wait
+from glider_navigation.surface_interval import begin, drifted_variance, wait
 
 #: Current and drift at the surface (m/s, north and east), and how the vehicle flies.
 CURRENT, DRIFT = np.array([0.12, -0.09]), np.array([0.20, -0.02])
@@ -36,7 +36,7 @@ def _navigate(state, q, depths, has_fix, places, variance, params, dt):
     rows = np.empty((len(q), 10))
     odom = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(len(q)):
-        heard = Heard(
+        received = Received(
             Joints(0.0, 0.0, 0.0, 0.0),
             odom,
             odometry_from_wire(odom),
@@ -45,7 +45,7 @@ def _navigate(state, q, depths, has_fix, places, variance, params, dt):
             Fix(has_fix[i], places[i, 0], places[i, 1], variance),
             0.0,
         )
-        state, is_ = method_step(state, heard, params, dt)
+        state, is_ = method_step(state, received, params, dt)
         x = odometry_from_wire(is_.odom)
         rows[i, 0], rows[i, 1], rows[i, 2] = x.p_n, x.p_e, x.p_d
         rows[i, 3], rows[i, 4], rows[i, 5] = is_.place.nn, is_.place.ne, is_.place.ee
@@ -260,9 +260,9 @@ def _first(**changes):
     settings = NavigationSettings(method='dead_reckoned')
     odom = (0.0,) * 13
     rest = Joints(0.0, 0.0, 0.0, 0.0), odom, odometry_from_wire(odom)
-    heard = Heard(*rest, Imu(1.0, *(6 * (0.0,)), False), 3.0, Fix(False, 0.0, 0.0, 0.0), 0.0)
+    received = Received(*rest, Imu(1.0, *(6 * (0.0,)), False), 3.0, Fix(False, 0.0, 0.0, 0.0), 0.0)
     state, params = settings.initial_state().intake, settings.params().intake
-    state, told = take_in(state, heard._replace(**changes), params, TICK_S)
+    state, told = take_in(state, received._replace(**changes), params, TICK_S)
     return told, is_refusing(state)
 
 
@@ -318,12 +318,12 @@ def test_a_depth_that_jumps_is_left_until_none_was_believed_for_long():
     imu = Imu(1.0, *(6 * (0.0,)), False)
     state, params = settings.initial_state().intake, settings.params().intake
     far = 300.0 + 2.0 * params.gate.depth_jump
-    heard = Heard(*rest, imu, 300.0, Fix(False, 0.0, 0.0, 0.0), 0.0)
-    state, told = take_in(state, heard, params, TICK_S)
+    received = Received(*rest, imu, 300.0, Fix(False, 0.0, 0.0, 0.0), 0.0)
+    state, told = take_in(state, received, params, TICK_S)
     assert told.depth == 300.0
     waited_s = 0.0
     while told.depth == 300.0:
-        state, told = take_in(state, heard._replace(depth=far), params, TICK_S)
+        state, told = take_in(state, received._replace(depth=far), params, TICK_S)
         waited_s += TICK_S
         assert waited_s < params.hold_s + 1.0
     assert told.depth == far
@@ -450,7 +450,7 @@ def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
     root = np.array([[0.02, 0.0, 0.0], [0.004, 0.01, 0.0], [-0.006, 0.003, 0.015]])
     P = root @ root.T if tide else np.diag([4e-4, 0.0, 0.0])
     h = np.array([1.0, 0.7, -0.4])
-    belief = initial_belief(tide)._replace(
+    estimate = initial_estimate(tide)._replace(
         p=Uncertainty(*(float(P[i, j]) for i in range(3) for j in range(i, 3))),
         q=2e-8,
         weight=4.0,
@@ -465,7 +465,7 @@ def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
         begun=still,
         variance=900.0,
         through=through,
-        believed=still,
+        by_current=still,
         forecast=forecast,
         t_s=t_s,
         cos_s=h[1] * t_s,
@@ -486,7 +486,7 @@ def test_covariance_of_a_place_is_that_of_its_errors_drawn_by_lot(tide):
     holds = rng.normal(0.0, 0.3, (count, 1)) * (np.array(told_now) - told_before)
     errors = start + t_s * (sea + holds + flown(glide) - flown(before))
     drawn = np.cov(errors.T)
-    told = place_covariance(way, belief, trust, told_before, params)
+    told = place_covariance(way, estimate, trust, told_before, params)
     assert [told.nn, told.ee] == pytest.approx(np.diag(drawn), rel=0.012)
     scale = math.sqrt(told.nn * told.ee)
     assert told.ne == pytest.approx(drawn[0, 1], abs=0.01 * scale)

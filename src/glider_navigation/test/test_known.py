@@ -9,7 +9,7 @@ import pytest
 
 from glider_base.frames import odometry_from_wire, odometry_to_wire
 from glider_base.signals import TICK_S, Imu, Joints, Odometry
-from glider_navigation.method import Fix, Heard, method_step
+from glider_navigation.method import Fix, Received, method_step
 from glider_navigation.phase import KNOWN
 from glider_navigation.settings import NavigationSettings
 
@@ -28,10 +28,10 @@ class Navigation:
         self.params, self.state = settings.params().method, settings.initial_state().method
 
     def tick(self, wire, mu=0.0):
-        heard = Heard(
+        received = Received(
             Joints(0.0, 0.0, mu, 0.0), wire, odometry_from_wire(wire), NO_IMU, 0.0, NO_FIX, 0.0
         )
-        self.state, believed = method_step(self.state, heard, self.params, TICK_S)
+        self.state, believed = method_step(self.state, received, self.params, TICK_S)
         return believed
 
 

@@ -82,7 +82,7 @@ def test_settings_become_what_kernels_know():
         dead_reckoned={'start_std_m': 7.0, 'speed_error_share': 0.1},
     )
     params, state = settings.params().method, settings.initial_state().method
-    assert not params.believes_current
+    assert not params.estimates_current
     assert params.speed_variance == pytest.approx(0.01)
     assert tuple(state.place) == tuple(state.stay.place) == (30.0, -40.0)
     assert state.stay.known.pp == 49.0

@@ -22,22 +22,22 @@ SIZES, FIRST = (0.18, 0.18, 0.42, 0.42), 2000
 #: rms by which the depth-averaged current of a forecast is off (m/s), and how long is flown (s).
 ERRORS, DURATION_S = (0.0, 0.05, 0.15), 120.0 * 3600.0
 PERSISTENCE = 'persistence'
-#: What is believed of a forecast: all of it, or the share that there is in the sea.
+#: What is used of a forecast: all of it, or the share that there is in the sea.
 WAYS = {'whole forecast': 0.0, 'its share': ForecastSettings().share_std}
 CASES = [(PERSISTENCE, 0.0), *((way, error) for error in ERRORS for way in WAYS)]
-#: The first surfacings are not judged: all that is believed at first is the forecast.
+#: The first surfacings are not judged: all that is known at first is the forecast.
 _SETTLED = 3
 #: By its share a vehicle is off at most so many times as far as by the better of the others.
 LIMIT = 1.1
 
 
 def scenario_in(sea: Path, forecast: Path, way: str) -> Scenario:
-    """The mission in a sea, and what is believed of a forecast."""
+    """The mission in a sea, and what is used of a forecast."""
     changes = {'orders': [], 'duration_s': DURATION_S, 'current.field.file': str(sea)}
     if way != PERSISTENCE:
         field = {'kind': 'grid', 'file': str(forecast)}
-        believed = {'field': field, 'share_std': WAYS[way]}
-        changes |= {'navigation.current': 'forecast', 'navigation.forecast': believed}
+        used = {'field': field, 'share_std': WAYS[way]}
+        changes |= {'navigation.current': 'forecast', 'navigation.forecast': used}
     return load_scenario('eddies_10d', changes)
 
 

@@ -35,7 +35,7 @@ from glider_model.vehicle.surface import surface_loads
 from glider_studies.random_faults import sample_faults, validated
 from glider_studies.workers import Pool, Progress
 
-#: Sideslip by which the moment of a steering surface is told (rad).
+#: Sideslip by which the moment of a steering surface is given (rad).
 SLIP = 1e-6
 #: What a plant differs by: uniformly, by at most so much.
 COEFFICIENT_SPREAD, ADDED_MASS_SPREAD = 0.3, 0.15
@@ -72,7 +72,7 @@ WEAK_STEERING = 0.25
 #: Glide that stability and steering are judged in, with half of the pump's range at most.
 _GLIDE_KG, _GLIDE_PITCH_DEG, _ROLL_MASS_DEG = 0.4, 30.0, 10.0
 
-#: What is told of the navigation of each flight.
+#: What is shown of the navigation of each flight.
 NAVIGATION = (
     'surfacings',
     'surfacing_error_m',
@@ -154,7 +154,7 @@ def _drawn(base: Scenario, seed: int, faults: int) -> dict[str, Any]:
     """What is drawn of a plant of a scenario by its seed, with as many faults."""
     vehicle = load_vehicle(base.vehicle).params()
     plant = sample_plant(seed, vehicle, base.navigation.jumps)
-    if base.water.profile is not None or base.water.grid.file:  # the density is told
+    if base.water.profile is not None or base.water.grid.file:  # the density is given
         plant = {**plant, 'water': {}}
     shows = measured(base.topics, base.sensors.gyro)
     drawn = sample_faults(seed, faults, base.duration_s, shows=shows)
@@ -269,7 +269,7 @@ def outcome(scores: dict, failed: bool, diverged: bool) -> str:
 def _farthest_m(scores: dict) -> float:
     """How far a flight was off its path (m); one that reckons, where it came up.
 
-    The first ways of such a flight are not counted: nobody has told it of the current.
+    The first ways of such a flight are not counted: nothing has shown it the current.
     """
     navigation = scores['navigation']
     if navigation['ellipse_95_share'] is None:
@@ -347,7 +347,7 @@ def _rows(
 
 
 def pooled(flights: list[dict]) -> dict[str, Any]:
-    """How well vehicles knew where they were, over all surfacings of what is told of them.
+    """How well vehicles knew where they were, over all surfacings of what is shown of them.
 
     A figure without data is None.
     """

@@ -41,14 +41,14 @@ GAIN, LOSS = 0.9, 1.1
 
 def scenario_in(sea: Path, forecast: Path, way: str) -> Scenario:
     """The mission in a sea, in one of `WAYS`; a forecast is taken along."""
-    believed = {'field': {'kind': 'grid', 'file': str(forecast)}, 'late_h': LATE_H}
+    used = {'field': {'kind': 'grid', 'file': str(forecast)}, 'late_h': LATE_H}
     changes = {
         'orders': [],
         'current.field.file': str(sea),
         'forecast.file': str(forecast),
         'forecast.late_h': LATE_H,
         'navigation.current': 'forecast',
-        'navigation.forecast': believed,
+        'navigation.forecast': used,
     }
     return load_scenario('eddies_10d', {**changes, **WAYS[way]})
 

@@ -65,7 +65,7 @@ class Outcome(NamedTuple):
 
 
 def dask_setup(worker: Any = None) -> None:
-    """Have Dask log nothing in this process: what matters is told by the commands."""
+    """Have Dask log nothing in this process: what matters is said by the commands."""
     for name in ('distributed', 'distributed.client', 'tornado.application'):
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
@@ -272,7 +272,7 @@ def workers_at_work(
 ):
     """Workers of a command; yields their pool, and the update of a bar of flights.
 
-    They fly laws with methods, ``combinations``. What ends their work early is told, with what
+    They fly laws with methods, ``combinations``. What ends their work early is named, with what
     ``advice`` adds, and is the exit code.
     """
     try:

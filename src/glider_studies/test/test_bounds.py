@@ -31,17 +31,17 @@ from glider_studies.bounds.study import bounds
 B, K = 0.0276, -0.303
 
 
-def made(b=B, k=K, faster=1.0, believed_b=B):
+def made(b=B, k=K, faster=1.0, estimated_b=B):
     """A loop by hand, with a law that believes b and knows k: bandwidth .035, lookahead 150 s."""
-    turn = faster * 0.035 / believed_b
-    ahead = (1.1 - turn * k) / believed_b  # of the turn itself, and of the roll that it takes
+    turn = faster * 0.035 / estimated_b
+    ahead = (1.1 - turn * k) / estimated_b  # of the turn itself, and of the roll that it takes
     return SteeringLoop(
         speed=0.435,
         b=b,
         k=k,
         line_of_sight=faster / (150.0 * 0.435),
         heading_filter=FilterParams(0.07, 0.012),
-        law=(turn, ahead, -turn, -0.1 / believed_b, turn * k, 0.1 * k / believed_b),
+        law=(turn, ahead, -turn, -0.1 / estimated_b, turn * k, 0.1 * k / estimated_b),
         limit=math.radians(30.0),
         roll_filter=FilterParams(0.5, 0.08),
         leg_s=3700.0,
@@ -67,7 +67,7 @@ def current(loop):
 @pytest.fixture(scope='module')
 def strong():
     """A vehicle that turns well for its kick, as zhang2021 does in a climb."""
-    return made(b=-0.0367, k=0.295, believed_b=-0.0367)
+    return made(b=-0.0367, k=0.295, estimated_b=-0.0367)
 
 
 @pytest.fixture(scope='module')
@@ -190,7 +190,7 @@ def test_no_certificate_with_gains_five_times_too_large():
 
 def test_no_certificate_where_the_kick_outruns_the_turn():
     """A tenth of the steering, whoever knows it, with gains for all of it."""
-    assert gain(made(b=0.1 * B, believed_b=0.1 * B), 1) is None
+    assert gain(made(b=0.1 * B, estimated_b=0.1 * B), 1) is None
 
 
 def test_a_certificate_is_refuted_where_it_does_not_hold(loop, current):

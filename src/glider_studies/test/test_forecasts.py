@@ -68,7 +68,7 @@ def test_a_forecast_is_off_by_what_it_says_and_its_sea_is_the_same(tmp_path):
         flown = scenario_in(tmp_path / 'sea.nc', tmp_path / 'forecast.nc', way)
         settings = flown.navigation_settings()
         assert settings.forecast.share_std == WAYS[way]
-        assert settings.params().method.forecast.is_believed
+        assert settings.params().method.forecast.is_used
         assert flown.current.field.file != settings.forecast.field.file
 
 

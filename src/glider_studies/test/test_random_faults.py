@@ -101,10 +101,10 @@ def test_who_is_struck_too_fast_is_lost_if_the_faults_before_would_have_lost_it(
     up = [(0.0, 0.0), (2500.0, 140.0), (6000.0, 0.0), (10000.0, 0.0)]
     without = []
 
-    def fly_made_up(scenario, takers):
+    def fly_made_up(scenario, sinks):
         without.extend(scenario.faults)
         made_up = flight(SINKS if alone == 'sinks' else up)
-        vars(takers[0]).update(vars(made_up))
+        vars(sinks[0]).update(vars(made_up))
 
     monkeypatch.setattr(oracle, 'fly', fly_made_up)
     flood = {'kind': 'leak', 'rate_kgps': 1.0, 'limit_kg': 50.0, 'at_s': 4300.0}

@@ -3,7 +3,7 @@
 """NamedTuples of hundreds of numbers from Python to compiled code and into tables, quickly made.
 
 What numba makes to take such a tuple apart in a call from Python is long to compile, and so is a
-line of Python for each of its numbers. Here they go by a few arrays, and LLVM is told of each.
+line of Python for each of its numbers. Here they go by a few arrays, and LLVM sees each of them.
 """
 
 import numba

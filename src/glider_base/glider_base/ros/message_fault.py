@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What goes wrong with messages on purpose, as a person writes it and as a node is told it."""
+"""What goes wrong with messages on purpose, as a person writes it and as a node gets it."""
 
 import math
 from typing import Literal

@@ -220,12 +220,12 @@ def _fly(
         with progress(planned_ticks(scenario)) as (flying, reading):
             if begin_view:
                 flying = _after_first(begin_view, flying)
-            shown, takers = (flying, reading), [tracer] if tracer else []
-            scenario, card = fly_by(engine, scenario, folder, takers, shown, bag, sync, **nodes)
+            shown, sinks = (flying, reading), [tracer] if tracer else []
+            scenario, card = fly_by(engine, scenario, folder, sinks, shown, bag, sync, **nodes)
     has_room = True
     try:
         write_score(folder, card)
-    except ConfigurationError as error:  # what was flown is told all the same
+    except ConfigurationError as error:  # what was flown is shown all the same
         messages.print(f'no score: {error}', style='red', soft_wrap=True)
         has_room = False
     if tracer and has_room:

@@ -180,7 +180,7 @@ def _water(topic: str, what: str) -> list[_Variable]:
     return [*_velocity(topic, what)[:2], *_each(topic, 'm2 s-2', f'{what}, ', _COVARIANCE)]
 
 
-#: What there is of sensors and beliefs, by topic: nothing of it where navigation has none.
+#: What there is of sensors and estimates, by topic: nothing of it where navigation has none.
 _BESIDE = {
     'imu': (
         *_euler('imu', 'measured'),
@@ -208,8 +208,8 @@ _BESIDE = {
 def _turn(log, out):
     """Fill ``out``, float64[n, len(_TURNED)], from log rows, float64[n, ROW]."""
     for row in range(log.shape[0]):
-        believed = odometry_from_wire(log[row, _ODOM : _ODOM + 13])
-        angles = euler_from_quaternion(believed.q_w, believed.q_x, believed.q_y, believed.q_z)
+        estimated = odometry_from_wire(log[row, _ODOM : _ODOM + 13])
+        angles = euler_from_quaternion(estimated.q_w, estimated.q_x, estimated.q_y, estimated.q_z)
         reference = reference_from_wire(log[row, _REFERENCE : _REFERENCE + 13])
         water = water_from_wire(log[row, _CURRENT : _CURRENT + 3])
         estimate = water_from_wire(log[row, _ESTIMATE : _ESTIMATE + 3])
@@ -217,7 +217,7 @@ def _turn(log, out):
         motion = (true.p_n, true.p_e, true.p_d)
         attitude = euler_from_quaternion(true.q_w, true.q_x, true.q_y, true.q_z)
         wrench = wrench_from_wire(log[row, _WRENCH : _WRENCH + 3])
-        turned = (believed, angles, reference, water, estimate, motion, attitude, wrench)
+        turned = (estimated, angles, reference, water, estimate, motion, attitude, wrench)
         put(out, row, 0, turned)
 
 
@@ -239,7 +239,7 @@ def _named(found: dict[_Variable, np.ndarray]) -> dict[str, tuple]:
 
 
 def _beside(log: np.ndarray, scenario: Scenario) -> dict[str, tuple]:
-    """Covariance of the place, and what there is of sensors and beliefs, as xarray takes them."""
+    """Covariance of the place, and the sensors and estimates in a run, as xarray takes them."""
     xx, xy, _, yy = log[:, COLUMNS['odom']].T[13:].copy()
     place = _each('odom', 'm2', 'estimated position, ', _COVARIANCE)
     found = dict(zip(place, (yy, xy, xx), strict=True))
@@ -362,7 +362,7 @@ def make_dataset(log: np.ndarray, scenario: Scenario, score: dict[str, Any]) -> 
 
     Columns of topics that were not recorded are NaN. The variables are one-dimensional over
     ``time`` (s), each with ``units``, ``long_name``, ``topic`` and, if it has one, ``frame``.
-    Those of sensors and beliefs that navigation does not have are not there.
+    Those of sensors and estimates that navigation does not have are not there.
     """
     time_s = np.arange(len(log)) * TICK_NS / 1e9
     about = ('scenario', 'vehicle', 'controller', 'guidance', 'seed', 'status')

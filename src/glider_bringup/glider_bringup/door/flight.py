@@ -46,7 +46,7 @@ class Event(NamedTuple):
 class Past(NamedTuple):
     """What a flight has been up to a tick."""
 
-    row: np.ndarray | None  #: what the last one told, float64[ROW]; None: there was none
+    row: np.ndarray | None  #: the numbers of the last one, float64[ROW]; None: there was none
     is_under: bool  #: has been under water since it was last at the surface
     is_over: bool
     orders: tuple[Order, ...]  #: that it was given
@@ -168,7 +168,7 @@ class Flight:
     def now(self) -> dict[str, Any]:
         """Every number of the last tick, by the names of `Run.to_xarray`: NED, FRD, SI, radians.
 
-        What is true is ``ground_truth_odom_...``, what is believed ``odom_...``. Empty before the
+        What is true is ``ground_truth_odom_...``, what is estimated ``odom_...``. Empty before the
         first tick.
         """
         from glider_bringup.door.dataset import numbers_of
@@ -233,7 +233,7 @@ class Flight:
         Returns
         -------
         Order
-            What was told, and when.
+            What was ordered, and when.
 
         Raises
         ------

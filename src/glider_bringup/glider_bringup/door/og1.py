@@ -92,7 +92,7 @@ def write_og1(
     """
     with installed('h5netcdf, which writes NetCDF 4'):
         import h5netcdf  # xarray writes NetCDF 4 through it
-    bag, taker = Bag(run), Rows(SECOND, ('imu', 'pressure', 'fix', 'odom'))
+    bag, sink = Bag(run), Rows(SECOND, ('imu', 'pressure', 'fix', 'odom'))
     with scenario_of(run, bag.attachments) as found:
         scenario, card = found.scenario, read_run(run, traced=False).card
         began_s = start_of(scenario, start)
@@ -102,8 +102,8 @@ def write_og1(
                 '--start 2026-03-01T06:00, or a run with origin.time)'
             )
         total = int(scenario.duration_s / (TICK_NS / 1e9))
-        read_back(bag, scenario.vehicle, [taker], lambda ticks: progress(ticks, total))
-        rows = taker.result()
+        read_back(bag, scenario.vehicle, [sink], lambda ticks: progress(ticks, total))
+        rows = sink.result()
         if not len(rows):
             raise ConfigurationError(f'{run}: no tick was recorded (allowed: one and more)')
         dataset = flight_dataset(rows, scenario, card, began_s)

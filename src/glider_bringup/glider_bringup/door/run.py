@@ -17,7 +17,7 @@ import numpy as np
 from glider_base.ros.places import given_domain
 from glider_base.settings import ConfigurationError, path_of
 from glider_bringup.engines.compiling import shown_once
-from glider_bringup.engines.flight import Progress, Taker
+from glider_bringup.engines.flight import Progress, Sink
 from glider_bringup.engines.flight import fly as fly_direct
 from glider_bringup.scoring.card import scorecard, write_score
 from glider_bringup.scoring.one_hertz import Rows
@@ -223,12 +223,12 @@ def fly(
     out = path_of('out', out) if kept else None
     rows, tracer = Rows(), make_tracer(flown)
     in_bag = kept and (bag or engine == 'nodes')
-    takers = [*([] if in_bag else [rows]), *([tracer] if kept else [])]
+    sinks = [*([] if in_bag else [rows]), *([tracer] if kept else [])]
     with (
         _run_folder(flown, out, engine) as folder,
         bar(planned_ticks(flown)) if progress else nullcontext((None, None)) as shown,
     ):
-        flown, card = fly_by(engine, flown, folder, takers, shown, bag)
+        flown, card = fly_by(engine, flown, folder, sinks, shown, bag)
         if kept:
             write_score(folder, card)
             tracer.result().save(folder / TRACES_FILE)
@@ -249,7 +249,7 @@ def fly_by(
     engine: str,
     scenario: Scenario,
     folder: Path | None,
-    takers: Iterable[Taker],
+    sinks: Iterable[Sink],
     shown: tuple[Progress | None, Callable[[int], None] | None],
     bag: bool,
     sync: str = 'end',
@@ -264,18 +264,18 @@ def fly_by(
     from glider_bringup.console import compiling
 
     scorer, (flying, reading) = Scorer(scenario), shown
-    takers = [scorer, *takers]
+    sinks = [scorer, *sinks]
     with shown_once(combination_of(scenario), compiling) if engine == 'direct' else nullcontext():
         if engine == 'direct' and not bag:  # nothing of ROS is needed
-            flight = fly_direct(scenario, takers, flying)
+            flight = fly_direct(scenario, sinks, flying)
         else:
             from glider_bringup.engines.recorded import fly_nodes, fly_recorded
 
             if engine == 'direct':
-                flight = fly_recorded(scenario, folder, takers, flying, sync)
+                flight = fly_recorded(scenario, folder, sinks, flying, sync)
             else:
                 nodes |= {'sync': sync, 'on_read': reading or (lambda ticks: None)}
-                flight = fly_nodes(scenario, folder, takers, flying, **nodes)
+                flight = fly_nodes(scenario, folder, sinks, flying, **nodes)
     if flight.orders:
         scenario = scenario.with_orders(flight.orders)
         if folder:

@@ -75,7 +75,7 @@ class Chart(NamedTuple):
 
 
 def start_of(scenario: Scenario, start: str | None) -> float | None:
-    """When a run started (s since 1970): as its scenario says, or else as told; None if unknown.
+    """When a run started (s since 1970): as its scenario says, or else as given; None if unknown.
 
     Raises ConfigurationError if both say it, or it is no time.
     """

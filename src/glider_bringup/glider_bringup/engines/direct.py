@@ -123,10 +123,10 @@ def fly_held(held, log, dt):
         position = (place.p_n, place.p_e, place.p_d)
         current, velocity = current_step_in_place(current, position, t_s, in_current, dt)
         water = water_to_wire(velocity)
-        navigation, believed, phase = navigation_tick(
+        navigation, estimated, phase = navigation_tick(
             navigation, t_s, (joints, *sensors), in_navigation, dt
         )
-        odom = believed[0]
+        odom = estimated[0]
         guidance, guided, stage = guidance_tick(
             guidance, t_s, (odom, measured.altitude), in_guidance, dt
         )
@@ -137,7 +137,7 @@ def fly_held(held, log, dt):
         guard, guarded, reported = guard_tick(guard, t_s, heard, in_guard, dt)
         plant = plant_move(plant, (guarded[0], water, guarded[1]), in_plant, dt)
         said = (phase, stage, limits, reported)
-        put(log, row, 0, (*numbers, water, *believed, *guided, *controlled, *guarded, *said))
+        put(log, row, 0, (*numbers, water, *estimated, *guided, *controlled, *guarded, *said))
         rows = row + 1
         if finished:
             break

@@ -49,7 +49,7 @@ from glider_mission.scenario import Scenario
 _STAGE, _NO_PROGRESS = COLUMNS['stage'], COLUMNS['no_progress']
 _ODOM, _BATTERY = COLUMNS['odom'], COLUMNS['battery']
 
-#: Rows that takers are given at a time: a quarter of an hour, which a processor's cache may hold.
+#: Rows that sinks are given at a time: a quarter of an hour, which a processor's cache may hold.
 TAKEN_TICKS = 9000
 
 #: Called now and then with the ticks flown and the depth (m).
@@ -67,7 +67,7 @@ class Outcome(NamedTuple):
     orders: tuple[Order, ...] = ()  #: that were given by who planned the route
 
 
-class Taker(Protocol):
+class Sink(Protocol):
     """What follows a flight: a score, traces, a bag.
 
     One that has a method ``order`` is given the orders that come in flight, before their rows;
@@ -87,12 +87,12 @@ def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
 
 @dataclass
 class Past:
-    """What a mission has been told, and has told, until now."""
+    """What a mission was ordered, and has reported, until now."""
 
     waiting: tuple[Order, ...]  #: those to come
     tick: int = 0  #: ticks flown
     stage: int = -1  #: of guidance, at the last one; -1: there was none
-    no_progress: int = 0  #: what guidance told of that then
+    no_progress: int = 0  #: what guidance reported of that then
     arrived: bool = False  #: it is at the end of its path, and was near enough to its last point
     battery: Battery = Battery(*WHEN_SILENT['battery'])  #: what it said then
     own: tuple[Order, ...] = ()  #: what it orders itself by that, to come
@@ -110,15 +110,15 @@ class Kept(NamedTuple):
 class Held:
     """A mission between two ticks, where compiled code finds it, and the orders that it follows.
 
-    ``mission`` is flown instead of `mission_of` the scenario; the takers that ``follow`` orders
-    are told of them, and those that take an ``order`` of what a ``pilot`` gives.
+    ``mission`` is flown instead of `mission_of` the scenario; the sinks that ``follow`` orders
+    are given them, and those that take an ``order`` of what a ``pilot`` gives.
     """
 
     def __init__(
         self,
         scenario: Scenario,
         mission: tuple[MissionState, MissionParams] | None = None,
-        takers: Iterable[Taker] = (),
+        sinks: Iterable[Sink] = (),
         pilot: Pilot | None = None,
     ) -> None:
         state, self._params = mission or mission_of(scenario)
@@ -126,8 +126,8 @@ class Held:
         self._scenario, self._settings = scenario, scenario.guidance_settings()
         self.past = Past(tuple(scenario.orders))
         self._pilot, self._row = pilot, None
-        self._followers = [taker for taker in takers if hasattr(taker, 'follow')]
-        self._hearers = [taker for taker in takers if hasattr(taker, 'order')]
+        self._followers = [sink for sink in sinks if hasattr(sink, 'follow')]
+        self._hearers = [sink for sink in sinks if hasattr(sink, 'order')]
         fly_held(self._held, np.empty((0, ROW)), TICK_S)
 
     def keep(self) -> Kept:
@@ -223,7 +223,7 @@ class Held:
         return judged_end(self._settings, log[:, _STAGE], log[:, _ODOM], self.past.arrived)
 
     def _look(self, log: np.ndarray) -> None:
-        """Note what guidance and battery told at the last tick, and what it orders itself."""
+        """Note what guidance and battery reported at the last tick, and what it orders itself."""
         self._row = row = log[-1].copy()
         before, self.past.no_progress = self.past.no_progress, int(row[_NO_PROGRESS])
         self.past.stage, self.past.battery = int(row[_STAGE]), Battery(*row[_BATTERY].tolist())
@@ -296,29 +296,29 @@ def refuse_planned_route(scenario: Scenario) -> None:
 
 def fly(
     scenario: Scenario,
-    takers: Iterable[Taker] = (),
+    sinks: Iterable[Sink] = (),
     progress: Progress | None = None,
     mission: tuple[MissionState, MissionParams] | None = None,
 ) -> Outcome:
     """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown.
 
     A number that is not finite ends it as failed, with what was flown before. So does a recording
-    that is gone; a disk that takes no more ends it as aborted. Each taker is given every row, in
+    that is gone; a disk that takes no more ends it as aborted. Each sink is given every row, in
     their order. ``mission`` is flown instead of `mission_of` the scenario. Raises
     ConfigurationError if messages are to go wrong, for there are none.
     """
     refuse_message_faults(scenario)
-    takers = tuple(takers)
+    sinks = tuple(sinks)
     status, reason, ticks = 'completed', '', 0
     with interrupts_noted() as interrupts:
         state, params = mission or mission_of(scenario)
         pilot = Pilot(scenario) if scenario.guidance.route == 'planned' else None
         start = time.perf_counter()
         try:
-            held = Held(scenario, (state, params), takers, pilot)
+            held = Held(scenario, (state, params), sinks, pilot)
             for log in blocks_of(held.fly, TAKEN_TICKS):
-                for taker in takers:
-                    taker.add(log)
+                for sink in sinks:
+                    sink.add(log)
                 ticks += len(log)
                 if progress:
                     progress(ticks, float(-log[-1, 2]))

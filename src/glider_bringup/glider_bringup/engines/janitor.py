@@ -3,7 +3,7 @@
 """Removes what processes that were killed have left in shared memory.
 
 A process that gets SIGKILL cannot tidy up, and whoever started it may be killed with it. This
-program stands outside of their tree. It is told process ids, line by line on standard input. When
+program stands outside of their tree. It reads process ids, line by line on standard input. When
 the input ends, because whoever started it is through with the run or is no more, it waits until
 the processes are gone and removes the segments of Fast DDS that nobody has any more, whoever left
 them. Ports, which are numbered for the whole machine, stay: Fast DDS takes them up again by

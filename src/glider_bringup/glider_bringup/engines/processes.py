@@ -261,7 +261,7 @@ class _Run:
 
     def pump(self, timeout_s: float) -> None:
         """Pass on what the nodes have said, waiting at most ``timeout_s`` for it."""
-        gone = self._server.look()  # first, so that all it had to tell is heard below
+        gone = self._server.look()  # first, so that all it had to tell is read below
         for key, _ in self._selector.select(timeout_s):
             self._read(key.fd, key.data)
         if gone:
@@ -344,7 +344,7 @@ class _Run:
     def stop(self) -> None:
         """End every process.
 
-        The plant goes first, so that ticks cease while all are there to be heard, and the recorder
+        The plant goes first, so that ticks cease while all are still there, and the recorder
         last, so that it has everything.
         """
         by_name = self.processes.values()

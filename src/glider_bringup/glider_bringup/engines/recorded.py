@@ -12,7 +12,7 @@ from glider_base.settings import ConfigurationError
 from glider_bringup.engines.flight import (
     Outcome,
     Progress,
-    Taker,
+    Sink,
     ended,
     fly,
     refuse_message_faults,
@@ -34,7 +34,7 @@ from glider_model.vehicle.file import steers_by
 def fly_recorded(
     scenario: Scenario,
     folder: Path,
-    takers: Iterable[Taker] = (),
+    sinks: Iterable[Sink] = (),
     progress: Progress | None = None,
     sync: Sync = 'end',
 ) -> Outcome:
@@ -46,7 +46,7 @@ def fly_recorded(
     recorded = recorded_topics(topics)
     bag = BagWriter(folder, scenario.name, attachments=attachments, topics=recorded, sync=sync)
     writer = LogWriter(bag, scenario.guidance_settings(), topics, steers_by(scenario))
-    flight = fly(scenario, [*takers, writer], progress)
+    flight = fly(scenario, [*sinks, writer], progress)
     try:
         if flight.status != 'aborted':
             writer.finish(flight.reason)
@@ -60,7 +60,7 @@ def fly_recorded(
 def fly_nodes(
     scenario: Scenario,
     folder: Path,
-    takers: Iterable[Reader] = (),
+    sinks: Iterable[Reader] = (),
     progress: Progress | None = None,
     *,
     speed: float = 0.0,
@@ -70,7 +70,7 @@ def fly_nodes(
     sync: Sync = 'end',
     layout: Layout = 'together',
 ) -> Outcome:
-    """Fly over nodes and topics; what takers are given is read back from the bag.
+    """Fly over nodes and topics; what sinks are given is read back from the bag.
 
     ``speed`` is in times real time, 0.0 as fast as possible. Nodes in a namespace of their own
     have their clock in it. ``on_log`` gets each line that a node prints, ``on_read`` the ticks
@@ -97,7 +97,7 @@ def fly_nodes(
     completed, reason = result.status == 'completed', result.reason
     recorded, lost = 0, 0
     if has_bag(folder):  # else it ended before the recorder was up
-        log = read_back(Bag(folder), scenario.vehicle, takers, on_read)
+        log = read_back(Bag(folder), scenario.vehicle, sinks, on_read)
         if completed and (missing := log.missing(None)):
             completed, reason = False, missing
         recorded, lost = sum(log.counts.values()), log.lost(completed)

@@ -31,14 +31,14 @@ from glider_base.ros.wire.codec import MessageError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.settings import ConfigurationError, Settings
 from glider_base.signals import TICK_NS
-from glider_base.wiring import BELIEFS, GUARD, SENSORS, WIRING
+from glider_base.wiring import ESTIMATES, GUARD, SENSORS, WIRING
 from glider_mission.disk import DiskError
 from glider_mission.recording.ros.rosbag2 import BagWriter, Sync
 from glider_mission.recording.tick_sorter import TickSorter
 
 _DRAIN_S = 0.01
 _PROGRESS_S = 0.25
-#: Told to stop, it does once nothing has come for this long, or at the latest (s).
+#: Asked to stop, it does once nothing has come for this long, or at the latest (s).
 _QUIET_S, _LATEST_S = 0.2, 1.0
 
 
@@ -53,7 +53,7 @@ class RecorderSettings(Settings):
         description='when the recording is synced to disk, to outlive a loss of power: never, at '
         'its end, or with every chunk too, before its ticks are acknowledged',
     )
-    topics: list[Literal[(*SENSORS, *BELIEFS)]] = Field(
+    topics: list[Literal[(*SENSORS, *ESTIMATES)]] = Field(
         ['measured_odom'], description='those of the topics that not every run has'
     )
     progress: bool = Field(False, description='print progress as JSON lines on standard output')
@@ -86,10 +86,10 @@ class RecorderNode(TickNode):
         self.held: dict[str, tuple[bytes, dict]] = {}  #: messages of nobody knows whom, by topic
         self.stage, self.last_odom, self.newest_ns, self.depth_m = '', b'', 0, 0.0
         self.end: tuple[int, bytes] | None = None  #: what the plant said last
-        self.heard: Counter[str] = Counter()  #: events by the node that told of them
+        self.heard: Counter[str] = Counter()  #: events by the node that reported them
         self.settled_ns: dict[str, int] = {}  #: newest tick of which a node's events are all here
         self.final_ns: int | None = None
-        self.stopped_s: float | None = None  #: when it was told to stop
+        self.stopped_s: float | None = None  #: when it was asked to stop
         self.came_s = 0.0  #: when the newest message came
         self.begun = False
         self.progress_s = 0.0
@@ -188,7 +188,7 @@ class RecorderNode(TickNode):
         self.has_path = True
 
     def on_count(self, array) -> None:
-        """Learn how many events a node has told of; not from the node of a second glider."""
+        """Learn how many events a node has reported; not from the node of a second glider."""
         count = health.count_in(array)
         report = self.reports.get(count.node.rpartition('/')[2]) if count else None
         if count and (count.node == self.replay or (report and report.process == count.process)):
@@ -292,7 +292,7 @@ class RecorderNode(TickNode):
             raise Stop(0)
 
     def is_stopped(self) -> bool:
-        """Whether it was told to stop, and what nodes said that are dead by now has come."""
+        """Whether it was asked to stop, and what nodes said that are dead by now has come."""
         if self.stopped_s is None:
             return False
         now_s = time.monotonic()
@@ -302,7 +302,7 @@ class RecorderNode(TickNode):
     def save(self) -> None:
         """Write what has come as far as it is complete, and let the plant go on."""
         if not self.ticks.lockstep:
-            if self.order.begun:  # what is told before the first tick is recorded with it
+            if self.order.begun:  # what is reported before the first tick is recorded with it
                 self.order.write_rest()
             self.bag.flush()
             return

@@ -133,7 +133,7 @@ class ViewerNode(Node):
             self.server.broadcast_time(stamp_ns)
 
     def run(self) -> None:
-        """Pass on messages until told to leave."""
+        """Pass on messages until asked to leave."""
         if not self.settings.led:
             self.look()
         while rclpy.ok():

@@ -44,13 +44,13 @@ def score_bag(
     scenario: Scenario,
     old: dict,
     progress: Reading,
-    takers: Iterable[Reader] = (),
+    sinks: Iterable[Reader] = (),
 ) -> dict:
-    """Scorecard of a bag, whose rows takers are given too; ``old`` is the one it has, or empty."""
+    """Scorecard of a bag, whose rows sinks are given too; ``old`` is the one it has, or empty."""
     scorer = Scorer(scenario)
     total = old.get('ticks') or planned_ticks(scenario)
     log = read_back(
-        bag, scenario.vehicle, [scorer, *takers], lambda ticks: progress(ticks, max(ticks, total))
+        bag, scenario.vehicle, [scorer, *sinks], lambda ticks: progress(ticks, max(ticks, total))
     )
     missing = log.missing(old.get('ticks'))
     if old:

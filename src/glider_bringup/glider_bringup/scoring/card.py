@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from glider_base.files import is_file, read_json
 from glider_base.settings import ConfigurationError, leaves, mistakes
-from glider_bringup.engines.flight import Outcome, Taker, fly
+from glider_bringup.engines.flight import Outcome, Sink, fly
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_mission.disk import write_whole
 from glider_mission.recording.bag_files import METADATA_FILE, bag_files, has_bag
@@ -35,10 +35,10 @@ LARGEST = 1e15
 STOPPED = ('aborted', 'failed')
 
 
-def fly_scored(scenario: Scenario, takers: Iterable[Taker] = ()) -> tuple[Outcome, dict]:
+def fly_scored(scenario: Scenario, sinks: Iterable[Sink] = ()) -> tuple[Outcome, dict]:
     """Fly with the direct engine, as `fly` does, and give the scores too."""
     scorer = Scorer(scenario)
-    flight = fly(scenario, [scorer, *takers])
+    flight = fly(scenario, [scorer, *sinks])
     return flight, scores_of(scenario, scorer)
 
 

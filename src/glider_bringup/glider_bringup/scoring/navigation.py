@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""How well the vehicle knew where it was: at each surfacing, before the first fix told it."""
+"""How well the vehicle knew where it was: at each surfacing, before the first fix showed it."""
 
 import math
 from typing import NamedTuple
@@ -25,7 +25,7 @@ ELLIPSE_95 = 5.991
 
 
 class _Way(NamedTuple):
-    """Of a way under water: sums of the current and of squared cross-track errors, and ticks."""
+    """Of a dive segment: sums of the current and of squared cross-track errors, and ticks."""
 
     east: float = 0.0
     north: float = 0.0
@@ -89,26 +89,26 @@ class NavigationScorer:
             self._was_fixed = bool(self._surfacings) and not self._waits_for_fix
             self._way, self._waits_for_fix = _Way(), False
             return
-        believed = row[_BELIEVED : _BELIEVED + 2]
-        if self._was_fixed and np.all(np.isfinite(believed)):  # what the way before told
-            self._surfacings[-1]['dac_believed_mps'] = _north_east(believed)
-            self._dac_errors.append(math.dist(believed, self._mean_current))
+        estimated = row[_BELIEVED : _BELIEVED + 2]
+        if self._was_fixed and np.all(np.isfinite(estimated)):  # by the dive segment before
+            self._surfacings[-1]['dac_believed_mps'] = _north_east(estimated)
+            self._dac_errors.append(math.dist(estimated, self._mean_current))
         ticks = max(1, self._way.ticks)
         self._mean_current = np.array(self._way[:2]) / ticks
         self._ways.append(math.sqrt(self._way.squares / ticks))
-        place, (believed_place, covariance) = true[_PLACE].tolist(), _believed(row)
-        off = _off_squared(place, believed_place, covariance)
+        place, (estimated_place, covariance) = true[_PLACE].tolist(), _estimated(row)
+        off = _off_squared(place, estimated_place, covariance)
         self._surfacings.append(
             {
                 't_s': seconds(tick),
                 'dive_t_s': seconds(self._dive_tick),
                 'true_ned_m': place,
-                'believed_ned_m': believed_place,
+                'believed_ned_m': estimated_place,
                 'covariance_m2': covariance,
                 'fix_ned_m': None,
                 'cross_track_m': float(true[_E2]),
                 'believed_cross_track_m': float(row[_E2]),
-                'error_m': math.dist(place, believed_place),
+                'error_m': math.dist(place, estimated_place),
                 'inside_95': None if off is None else off <= ELLIPSE_95,
                 'dac_true_mps': _north_east(self._mean_current),
                 'dac_believed_mps': None,
@@ -117,20 +117,20 @@ class NavigationScorer:
         self._waits_for_fix = True
 
     def _look_for_fix(self, rows: np.ndarray) -> None:
-        """Note how far the first fix is off what was believed."""
+        """Note how far the first fix is off the estimated place."""
         found = np.flatnonzero(rows[:, _FIX] >= 0.0)
         if not len(found):
             return
         self._waits_for_fix = False
-        at = max(0, int(found[0]) - 1)  # what was believed before it
+        at = max(0, int(found[0]) - 1)  # what was estimated before it
         _, latitude, longitude, variance, _ = rows[found[0], _FIX : _FIX + 5].tolist()
         fix = [*from_geodetic(latitude, longitude, self._origin)]
         self._surfacings[-1]['fix_ned_m'] = fix if all(map(math.isfinite, fix)) else None
-        off = _off_squared(fix, *_believed(rows[at]), variance)
+        off = _off_squared(fix, *_estimated(rows[at]), variance)
         if off is not None:
             self._innovations.append(off)
 
-    def result(self, method: str, believed_cross_track: dict) -> dict:
+    def result(self, method: str, estimated_cross_track: dict) -> dict:
         """The part ``navigation`` of ``score.json``; a figure without data is None."""
         surfacings = self._surfacings
         errors, beside = (
@@ -155,7 +155,7 @@ class NavigationScorer:
                 'under_water_rms_m': rms(ways[FOURTH + 1 :]),
             },
             'dac_error_mps': {'rms': rms(dac), 'worst': largest(dac)},
-            'believed_cross_track_m': believed_cross_track,
+            'believed_cross_track_m': estimated_cross_track,
             'ellipse_95_share': mean(within),
             'fixed': len(self._innovations),
             'innovation_squared': mean(self._innovations),
@@ -172,19 +172,19 @@ def _north_east(pair: np.ndarray) -> list[float] | None:
     return pair[::-1].tolist() if np.all(np.isfinite(pair)) else None
 
 
-def _believed(row: np.ndarray) -> tuple[list[float], list[float]]:
-    """Believed place (m), and its covariance (m^2): north, north and east, east."""
+def _estimated(row: np.ndarray) -> tuple[list[float], list[float]]:
+    """Estimated place (m), and its covariance (m^2): north, north and east, east."""
     return row[_PLACE].tolist(), row[_COVARIANCE].tolist()
 
 
 def _off_squared(
-    place: list[float], believed: list[float], covariance: list[float], variance: float = 0.0
+    place: list[float], estimated: list[float], covariance: list[float], variance: float = 0.0
 ) -> float | None:
-    """Squared distance of a place from the believed one, over its variance; None of none."""
+    """Squared distance of a place from the estimated one, over its variance; None of none."""
     nn, ne, ee = covariance
     nn, ee = nn + variance, ee + variance
     determinant = ee * nn - ne * ne
     if not determinant > 0.0:
         return None
-    d_n, d_e = place[0] - believed[0], place[1] - believed[1]
+    d_n, d_e = place[0] - estimated[0], place[1] - estimated[1]
     return (nn * d_e * d_e - 2.0 * ne * d_e * d_n + ee * d_n * d_n) / determinant

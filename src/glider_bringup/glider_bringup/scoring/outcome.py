@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What became of the vehicle: completed, surfaced by its guard, or lost.
 
-By the true depth, whatever the vehicle measured, and by what the guard told.
+By the true depth, whatever the vehicle measured, and by what the guard reported.
 """
 
 import math
@@ -31,7 +31,7 @@ from glider_model.ocean.bottom import least_height
 
 COMPLETED, SURFACED, LOST, INFEASIBLE = 'completed', 'surfaced', 'lost', 'infeasible'
 UNFINISHED = 'unfinished'
-#: How far a turn may overshoot the rated depth: as the guard has it, unless it is told otherwise.
+#: How far a turn may overshoot the rated depth: as the guard has it, unless it is set otherwise.
 LIMITS = GuardLimitSettings()
 #: The pace is known once so much of the path has been made good (-).
 LEAST_SHARE = 0.02
@@ -42,9 +42,9 @@ TRIES_S, CLIMBS_M = 600.0, 5.0
 
 
 def as_reported(bits: np.ndarray) -> np.ndarray:
-    """Bits of guard or control as they are told, which is once a second at most, int64[ticks].
+    """Bits of guard or control as they are reported, which is once a second at most, int64[ticks].
 
-    The same from a bag, which has what was told, and from a log, which has what was noticed.
+    The same from a bag, which has what was reported, and from a log, which has what was noticed.
     """
     bits, stamps_ns = bits.astype(np.int64), np.arange(len(bits)) * TICK_NS
     before = np.zeros(1, np.int64)

@@ -4,7 +4,7 @@
 
 The same function scores a bag and a direct run. What "run", "all" and "steady" count, and what an
 inflection is, is in docs/conventions.md. What is scored is the true motion, whatever the vehicle
-believes.
+estimates.
 """
 
 import math
@@ -58,14 +58,14 @@ HEADING_MEAN_S = 300.0
 #: A run is infeasible if the course could not be held for this share of the scored time.
 INFEASIBLE_SHARE = 0.5
 
-#: The course of the path is told by so much of it (m).
+#: The course of the path is that of so much of it (m).
 COURSE_M = 1.0
 #: What the event of a refused measurement says.
 REFUSED_SAYS = 'a measurement was refused, the last good one serves'
 
 #: What the score needs of every tick, in the order of `_series_of`.
 _SERIES = (
-    *('depth', 'e2', 'told_e2', 'pitch', 'pitch_ref', 'heading', 'rate_ref'),
+    *('depth', 'e2', 'reported_e2', 'pitch', 'pitch_ref', 'heading', 'rate_ref'),
     *('target_n', 'target_e', 'infeasible', 'guard', 'mask'),
     *('net_heaviness', 'pitch_mass', 'roll_mass', 'fin'),
 )
@@ -83,7 +83,7 @@ _EACH_S = round(1.0 / TICK_S)
 
 @kernel
 def _series_of(log, given):
-    """`_SERIES` of log rows with the true motion, and as they were told, float64[16, n]."""
+    """`_SERIES` of log rows with the true motion, and as they were reported, float64[16, n]."""
     series = np.empty((len(_SERIES), len(log)))
     for k in range(len(log)):
         row, joints = log[k], log[k, _FIRST_JOINT:]
@@ -142,7 +142,7 @@ class Scorer:
         self._blocks: list[np.ndarray] = []
         self._first: np.ndarray | None = None
         self._last: np.ndarray | None = None
-        #: first tick of another path, rows before and at it, and its course there, if told
+        #: first tick of another path, rows before and at it, and its course there, if given
         self._reroutes: list[tuple[int, np.ndarray, np.ndarray, float | None]] = []
         self._end: tuple[int, np.ndarray] | None = None
         self._stays: list[dict[str, Any]] = []
@@ -237,7 +237,7 @@ class Scorer:
             whole=steady & has_whole_mean,
             turn_m=max([rules.depth_m, *(one.depth_m for one in self._followed if one.depth_m)]),
         )
-        believed = flown._replace(e2=series('told_e2'))
+        estimated = flown._replace(e2=series('reported_e2'))
         dives = _count_dives(depth, dive_m(min(rules.depth_m, rules.shallowest_m)))
         way_m, time_s = self._along_path_m(), seconds(ticks)
         held = ~(series('infeasible')[scored & flies] > 0.0)
@@ -264,7 +264,7 @@ class Scorer:
             'guard': _guard(series('mask'), self._has_weight),
             'faults': self._faults.result(),
             'navigation': self._navigation.result(
-                rules.navigation, measured(believed, 'cross_track_m')['cross_track_m']
+                rules.navigation, measured(estimated, 'cross_track_m')['cross_track_m']
             ),
             'final_state': self._final_state(),
         }
@@ -408,9 +408,9 @@ def scores_of(scenario: Scenario, scorer: Scorer) -> dict:
 
 
 def _guard(mask: np.ndarray, has_weight: bool) -> dict:
-    """What the guard noticed in flight and did, and what control refused, as they told it.
+    """What the guard noticed in flight and did, and what control refused, as they reported it.
 
-    ``mask`` is the sum of the bits of `glider_guard.rows` and of `glider_control`, which were told
+    ``mask`` is the sum of the bits of `glider_guard.rows` and of `glider_control`, both reported
     together before there was a guard; a vehicle that ``has_weight`` can do more than surface.
     """
     gravest = DROP if has_weight else SURFACE

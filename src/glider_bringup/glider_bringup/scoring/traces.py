@@ -218,7 +218,7 @@ def _largest(values: np.ndarray) -> float:
 class Tracer:
     """Takes log blocks as they come and keeps `Traces` of them.
 
-    What was measured, or believed, is kept beside the truth where it is another. The actuators of
+    What was measured, or estimated, is kept beside the truth where it is another. The actuators of
     ``vehicle`` have limits. If it ``reckons`` its place, how far off that is is kept, too.
     """
 
@@ -314,7 +314,7 @@ def _motion(log: np.ndarray, odom: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _curves(log: np.ndarray, odom: np.ndarray, limits: np.ndarray) -> dict[str, np.ndarray]:
-    """Those and all others but what was measured or is believed."""
+    """Those and all others but what was measured or is estimated."""
     reference = poses_from_wire(log[:, COLUMNS['reference']])
     _bring_near(reference[:, 5], odom[:, 5])
     rising = log[:, COLUMNS['reference']][:, 9]
@@ -352,9 +352,9 @@ def _curves(log: np.ndarray, odom: np.ndarray, limits: np.ndarray) -> dict[str, 
 
 
 def _place(log: np.ndarray) -> dict[str, np.ndarray]:
-    """How far the believed place is off the true one, and how far it may be: by name, float64[n].
+    """How far the estimated place is off the true one, and how far it may be: by name, float64[n].
 
-    The bound is the longer half axis of the 95 % ellipse of what is believed.
+    The bound is the longer half axis of the 95 % ellipse of the estimate.
     """
     odom, truth = log[:, COLUMNS['odom']], log[:, COLUMNS['ground_truth/odom']]
     xx, xy, yy = odom[:, 13], odom[:, 14], odom[:, 16]
@@ -369,13 +369,13 @@ def _samples(log: np.ndarray, given: np.ndarray | None) -> np.ndarray:
     """What is sampled of log rows, float64[n, len(SAMPLES)]; ``given`` has the estimated place."""
     position, target = log[:, COLUMNS['odom']], log[:, COLUMNS['reference']]
     current = log[:, COLUMNS['current_velocity']] / KNOT_MPS
-    believed = np.full((len(log), 2), np.nan) if given is None else given[:, COLUMNS['odom']]
+    estimated = np.full((len(log), 2), np.nan) if given is None else given[:, COLUMNS['odom']]
     return np.stack(
         (
             *(position[:, 1], position[:, 0], -position[:, 2]),
             *(target[:, 1], target[:, 0], -target[:, 2]),
             *(current[:, 1], current[:, 0]),
-            *(believed[:, 1], believed[:, 0]),
+            *(estimated[:, 1], estimated[:, 0]),
         ),
         axis=1,
     )

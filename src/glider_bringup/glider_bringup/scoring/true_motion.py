@@ -17,7 +17,7 @@ _EAST, _NORTH = COLUMNS['reference'].start, COLUMNS['reference'].start + 1
 #: A target that moves farther than this between two ticks (m) is on another path: it moves no
 #: faster than 3 m/s, and a step on board stands for a second at most.
 JUMP_M = 3.0
-#: The course to a target is told by guidance's errors if it is so far away (m).
+#: The course to a target is that of guidance's errors if it is so far away (m).
 _AWAY_M = 1.0
 
 

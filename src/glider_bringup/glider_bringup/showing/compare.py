@@ -136,7 +136,7 @@ def _cells(score: Score, cards: list[dict[str, Any]]) -> list[Cell]:
     return cells
 
 
-#: What is told of a run before its scores, and what of one that has none of it.
+#: What is shown of a run before its scores, and what of one that has none of it.
 _TOLD: dict[str, tuple[Callable[[dict], str], str]] = {
     'status': (lambda card: ': '.join(filter(None, (card['status'], card['reason']))), ''),
     'flown': (flown_text, ''),

@@ -113,14 +113,14 @@ def draw_run(run: FlownRun, file: Path) -> None:
 
 def _draw_track(axis, samples: dict[str, np.ndarray]) -> None:
     """Plan view with the path and arrows of the current."""
-    (north, east), target, believed = (
+    (north, east), target, estimated = (
         (samples[f'{what}_north_m'] / 1e3, samples[f'{what}_east_m'] / 1e3)
         for what in ('track', 'target', 'believed')
     )
     axis.plot(*target[::-1], color=ORANGE, label='desired path')
     axis.plot(east, north, color=BLUE, label='track')
-    if np.any(np.isfinite(believed[0])):
-        axis.plot(*believed[::-1], color=GREEN, linestyle='--', label='estimated track')
+    if np.any(np.isfinite(estimated[0])):
+        axis.plot(*estimated[::-1], color=GREEN, linestyle='--', label='estimated track')
     if len(east):
         axis.plot(east[0], north[0], 'o', color=BLUE, label='start')
         pick = np.linspace(0, len(east) - 1, ARROWS).astype(int)

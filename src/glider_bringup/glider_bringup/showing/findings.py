@@ -26,7 +26,7 @@ ROLLED_DEG = 60.0
 #: path than this share of the first time.
 LEARNT_SHARE = 0.1
 #: With fewer surfacings inside their 95 % ellipses than by chance in one of a thousand runs, what
-#: is believed is too sure.
+#: is estimated is too sure.
 UNLIKELY = 1e-3
 
 
@@ -103,7 +103,7 @@ def lost_since_s(traces: Traces) -> float | None:
 def navigation_notes(part: dict[str, Any], learns: bool) -> list[str]:
     """How well a vehicle knew where it was that reckons its place, in sentences.
 
-    By part ``navigation`` of a scorecard; it ``learns`` where it believes in a current.
+    By part ``navigation`` of a scorecard; it ``learns`` where it estimates a current.
     """
     off = [abs(value) for value in part['surfacing_cross_track_m']]
     if not off:
@@ -140,7 +140,7 @@ def navigation_notes(part: dict[str, Any], learns: bool) -> list[str]:
 
 
 def _came_up(off: list[float], learns: bool) -> str:
-    """How far beside its path it came up, each time (m)."""
+    """How far cross-track it came up, each time (m)."""
     text = f'Came up {small(off[0])} off its path'
     if len(off) == 1:
         return f'{text}.'

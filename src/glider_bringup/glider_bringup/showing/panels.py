@@ -139,7 +139,7 @@ def flown_panel(name: str, caption: str, curves: tuple[Curve, ...], **look) -> P
 
 
 def _desired(name: str, label: str = 'desired') -> Curve:
-    """Curve of what was asked for, or believed."""
+    """Curve of what was asked for, or estimated."""
     return Curve(name, label, 'reference', dashed=True)
 
 
@@ -189,11 +189,11 @@ def _flight_panels(run: FlownRun) -> list[Panel]:
 
 
 def _navigation_panels(run: FlownRun) -> list[Panel]:
-    """Where the vehicle was, and where it believed to be; nothing of one that knows its place."""
+    """Where the vehicle was, and its own estimate; nothing of one that knows its place."""
     navigation = reckoned(run.card)
     if navigation is None:
         return []
-    believed = _desired('measured_cross_track_m', 'estimated')
+    estimated = _desired('measured_cross_track_m', 'estimated')
     return [
         Panel(
             'plan',
@@ -203,11 +203,11 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
             kind='plan',
         ),
         Panel(
-            'believed_cross_track',
+            'estimated_cross_track',
             'Cross-track error, true and estimated',
             'Distance from the path, + to starboard of it. It steers by its estimate.',
             'off the path (m)',
-            (Curve('cross_track_m', 'true', 'measured'), believed),
+            (Curve('cross_track_m', 'true', 'measured'), estimated),
             surfacings=0,
         ),
         flown_panel(
@@ -226,7 +226,7 @@ def _navigation_panels(run: FlownRun) -> list[Panel]:
 
 
 def _mean_current_panel(reports: list[dict], axis: int) -> Panel:
-    """Mean current to the north (0) or east (1) of every way under water."""
+    """Mean current to the north (0) or east (1) of every dive segment."""
     name = ('north', 'east')[axis]
 
     def spans(key: str) -> tuple[tuple[float, float, float], ...]:
@@ -266,7 +266,7 @@ def _actuator_panels(run: FlownRun) -> list[Panel]:
 
 
 def _current_panels(run: FlownRun) -> list[Panel]:
-    """The current, and what guidance believed it to be."""
+    """The current, and what guidance made of it."""
     return [
         Panel(
             f'current_{axis}',

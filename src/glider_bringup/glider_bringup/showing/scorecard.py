@@ -31,7 +31,7 @@ def _navigation_rows(card: dict) -> list[tuple[str, str]]:
     if part is None:
         return []
     error, dac = part['error_m'], part['dac_error_mps']
-    off, believed = part['surfacing_cross_track_m'], part['believed_cross_track_m']
+    off, estimated = part['surfacing_cross_track_m'], part['believed_cross_track_m']
     within, surfacings = part['ellipse_95_share'], part['surfacings']
     rms, worst = (None if dac[name] is None else dac[name] / KNOT_MPS for name in ('rms', 'worst'))
     times = f'{surfacings} surfacing' + 's' * (surfacings != 1)
@@ -42,8 +42,8 @@ def _navigation_rows(card: dict) -> list[tuple[str, str]]:
          f'{show(error["p95"], "m", 1)} (p95), {show(error["worst"], "m", 1)} (worst)'),
         ('cross-track, surfacing', f'max {show(max(map(abs, off), default=None), "m", 1)}, last '
          f'{show(abs(off[-1]) if off else None, "m", 1)}'),
-        ('cross-track, estimated', f'steady: rms {show(believed["rms_steady"], "m", 3)}, max '
-         f'{show(believed["max_steady"], "m", 3)}'),
+        ('cross-track, estimated', f'steady: rms {show(estimated["rms_steady"], "m", 3)}, max '
+         f'{show(estimated["max_steady"], "m", 3)}'),
         ('depth-averaged current', f'off by rms {show(rms, "kn", 3)}, worst '
          f'{show(worst, "kn", 3)}'),
         ('inside the 95 % ellipse', inside),
@@ -94,7 +94,7 @@ def engine_text(card: dict) -> str:
 
 
 def _end_rows(card: dict) -> list[tuple[str, str]]:
-    """Lines of what broke, what the guard told, and where it came up if it flew to its end."""
+    """Lines of what broke, what the guard reported, and where it came up if it flew to its end."""
     rows = [('fault', text) for text in fault_texts(card)]
     rows += [('guard', text) for text in event_texts(card, 'guard')]
     rows += [('guidance', text) for text in event_texts(card, 'no_progress')]
@@ -149,7 +149,7 @@ def _travel_rows(card: dict) -> list[tuple[str, str]]:
     return [('actuator travel', ', '.join(texts))]
 
 
-#: Parts of a card that are told in words of their own, where the first of their scores stands.
+#: Parts of a card that are shown in words of their own, where the first of their scores stands.
 _IN_WORDS: dict[str, Callable[[dict], list[tuple[str, str]]]] = {
     'messages_recorded': lambda card: [
         ('messages', f'{card["messages_recorded"]:,} recorded, {card["messages_lost"]:,} lost')
@@ -174,7 +174,7 @@ def fault_texts(card: dict) -> list[str]:
 
 
 def event_texts(card: dict, part: str) -> list[str]:
-    """What the guard told, or guidance of no progress: each once, its first time, how often."""
+    """Reports of the guard, or of no progress: each once, its first time, how often."""
     first, count = {}, Counter()
     for event in card.get(part, {}).get('events', []):
         reaction, text = event.get('reaction'), event['message']

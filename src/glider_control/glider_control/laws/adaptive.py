@@ -124,7 +124,7 @@ def adaptive_step(state, seen, params, dt):
         u, _ = steer_to(phase, error, wanted.psi_dot, u, steering.ratio, limit, params.steering)
         command = math.asin(u)
     roll = filter_command(state.roll, command, params.roll_filter, dt)
-    # what is measured is of this phase once a low pass has forgotten the turn-over
+    # what is measured is of this phase once a low pass has forgotten the inflection
     learns = steering.steady_s > params.steering.smoothing_s
     learns_p, learns_q = learns and not seen.roll_held, learns and not seen.pitch_held
     e_p, e_q = wrap_angle(now.phi - roll.value), now.theta - wanted.theta

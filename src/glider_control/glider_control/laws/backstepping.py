@@ -35,7 +35,7 @@ from glider_model.vehicle.rigid_body import GRAVITY, rigid_body
 
 #: Typical size of the regressors: V^2 alpha, V^2 (m^2/s^2), side force (N), rates (rad/s).
 SCALE_ALPHA, SCALE_V2, SCALE_SIDE, SCALE_ROLL_RATE, SCALE_PITCH_RATE = 0.01, 0.25, 2.0, 0.05, 0.03
-#: Adaptation waits this long after a turn-over (s).
+#: Adaptation waits this long after an inflection (s).
 LEARN_AFTER_S = 20.0
 #: Natural frequency of the filter on the virtual rate command (rad/s), and its rate limit.
 RATE_FILTER = FilterParams(2.0, 10.0)
@@ -151,7 +151,7 @@ class BacksteppingState(NamedTuple):
     roll: Filtered = Filtered(0.0, 0.0)  #: phi_s
     channels: Channels = INITIAL_CHANNELS
     heading_integral: float = 0.0  #: (rad/s)
-    steady_s: float = 0.0  #: time since the last turn-over (s)
+    steady_s: float = 0.0  #: time since the last inflection (s)
 
 
 def channel_params(

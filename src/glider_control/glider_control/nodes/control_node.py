@@ -20,7 +20,7 @@ class ControlNode(BlockNode):
     def forget(self) -> None:
         """Know nothing, as at the start."""
         super().forget()
-        self.refused = 0  #: samples of which it has told
+        self.refused = 0  #: samples that it has reported
 
     def tell(self, stamp_ns: int, flags: tuple[int, ...]) -> None:
         """Put a change of saturation on /diagnostics."""

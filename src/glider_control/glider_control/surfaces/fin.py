@@ -70,7 +70,7 @@ class FinLawState(NamedTuple):
     built_up: float  #: turn by the file (rad/s), delayed as a turn builds up
     by_file: float  #: the same, smoothed
     turn: float  #: yaw rate, smoothed (rad/s)
-    steady_s: float  #: time since the last turn-over (s)
+    steady_s: float  #: time since the last inflection (s)
 
 
 @steer.body(FinLawParams)

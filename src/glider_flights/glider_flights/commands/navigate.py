@@ -104,7 +104,7 @@ def _print_figures(report: dict) -> None:
     over = report['on_board_current_is_mean']
     lines = [
         (f'current off that on board (cm/s; {over})', report['dac_difference_mps'], 100.0, 2),
-        ('current told less that by its way (cm/s)', report['told_difference_mps'], 100.0, 2),
+        ('current reported less that by its dive (cm/s)', report['told_difference_mps'], 100.0, 2),
         ('way through the water off (m)', report['way_difference_m'], 1.0, 0),
         ('the same over that on board (%)', report['way_ratio'], 100.0, 1),
     ]

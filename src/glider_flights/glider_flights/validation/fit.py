@@ -106,7 +106,7 @@ def fitted(
 ) -> Model:
     """Model with the named constants so that it flies most like the recording.
 
-    It is told the speed by an ADCP of the stretches ``by_adcp``.
+    It is given the speed by an ADCP of the stretches ``by_adcp``.
     """
     if not names:
         return model

@@ -157,7 +157,7 @@ def _halves(found: list[Track], flight: Flight) -> tuple[list[Track], list[Track
 
 
 def _try_turns(rates: dict[str, Any], learnt: dict[str, Any]) -> None:
-    """Add how the plant turns, scaled by what it turned too much in the part that it was told."""
+    """Add how the plant turns, scaled by what it turned too much in the part that it was given."""
     for phase, rate in rates.items():
         known = learnt[phase]
         rate['fitted'] = None
@@ -169,7 +169,7 @@ def _try_turns(rates: dict[str, Any], learnt: dict[str, Any]) -> None:
 def _crosswise(
     found: list[Track], start: Model, impose: Imposed, names: tuple[str, ...], adcp: Adcp
 ) -> np.ndarray:
-    """Simulated less measured speed (m/s), by a model told of every other stretch only."""
+    """Simulated less measured speed (m/s), by a model given every other stretch only."""
     off = []
     for half in (0, 1):
         model = fitted(found, start, impose, names, found[1 - half :: 2], adcp)
@@ -216,7 +216,7 @@ def find_adcp(place: Path, file: Path | None) -> Adcp | None:
 VEHICLES = {'slocum': 'slocum_g2', 'seaglider': 'seaglider'}
 #: Both ways.
 HALVES = ('first', 'second')
-#: What is told of each.
+#: What is shown of each.
 OF_HALF = (*('segments', 'fitted', 'w_rmse_cmps', 'w_bias_cmps', 'peer', 'unfitted'), *STEERED_BY)
 
 

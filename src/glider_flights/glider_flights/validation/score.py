@@ -19,7 +19,7 @@ from glider_flights.validation.flying import RATE_S, Model, Simulated, Track
 
 #: Heading turns over this time (s), so that noise of the compass is small beside a turn.
 TURN_S = 60.0
-#: Turn rates are told for this speed through the water (m/s).
+#: Turn rates are given for this speed through the water (m/s).
 TURN_MPS = 0.5
 #: What turns a vehicle: the angle, and with which power of the speed its turn rate grows.
 STEERED_BY = {

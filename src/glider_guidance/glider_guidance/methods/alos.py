@@ -10,7 +10,7 @@ Marine Craft", IEEE Trans. Control Syst. Technol. 31 (6), doi 10.1109/TCST.2023.
 
 with pi_h the course and y_e the cross-track error. It needs no speed, no flight model and no
 estimate of the current, and a crab angle that stays as it is: one that changes, as from dive to
-climb or in a turn-over, is learnt anew.
+climb or in an inflection, is learnt anew.
 """
 
 import math

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Line of sight that crabs into the estimated current, as far ahead as the vehicle can follow.
 
-In a turn-over the vehicle is slow and the current takes it along, by a drift that is known
-beforehand: the desired track moves aside, so that half of it comes before the turn.
+In an inflection the vehicle is slow and the current takes it along, by a drift that is known
+beforehand: the desired track shifts across, so that half of it comes before the turn.
 """
 
 import math
@@ -18,10 +18,10 @@ from glider_model.onboard.learnt_steering import WELL_S, lookahead
 from glider_model.vehicle.file import Vehicle
 
 #: Of the drift of a turn this part is made up for before it, and as much after it; of the lag
-#: behind a desired track that moves aside this share is made up for beforehand.
+#: behind a desired track that shifts across this share is made up for beforehand.
 TURN_SHARE, OFFSET_AHEAD = 0.46, 0.5
 #: A phase that can hardly be steered is entered on its heading: the vehicle turns to it so long
-#: before the turn-over (s), less by the share that `WELL_S` is of its lookahead.
+#: before the inflection (s), less by the share that `WELL_S` is of its lookahead.
 READY_S = 120.0
 #: Position pulls the cross-track error that goes by the way over ground in this time (s), and lets
 #: it differ by so much at most (m).
@@ -94,7 +94,7 @@ def lead_turns(drift, seen, lookahead_s):
 def los_current_step(state, seen, params, dt):
     """Direction to fly: see `method_step`."""
     leg, current, course = seen.leg, seen.current, seen.course
-    # a turn-over is flown on the heading of the glide to come, as it should be
+    # an inflection is flown on the heading of the glide to come, as it should be
     speed = seen.glide_speed if leg.begins_to_turn_over else seen.speed
     lookahead_s = lookahead(seen.steering, leg.descends, seen.turning)
     over_ground = math.sqrt(seen.ground_n * seen.ground_n + seen.ground_e * seen.ground_e)

@@ -46,7 +46,7 @@ class GuidanceNode(BlockNode):
         self.create_service(Trigger, 'abort', self.on_abort)
         self.publish_path = self.add_output('path')
         self.publish_status, self.second = self.add_output('mission/status'), -1
-        # for the status alone: no input, as nothing is steered by it, and taken when it is told
+        # for the status alone: no input, as nothing is steered by it, and taken when it comes
         heard = None if self.ticks.lockstep else qos.FREE
         self.hears_battery = self._subscription(TOPICS['battery'], self.on_battery, profile=heard)
         self.tell_path(0)

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Coming up at the end of the path: what is left of it, and the dives that fit into that.
 
-All ways are told as the time that they take in a straight glide (s), so that each leg counts with
-the speed that the current leaves on it. A turn-over loses no way through the water, for a glider
+All ways are given as the time that they take in a straight glide (s), so that each leg counts with
+the speed that the current leaves on it. An inflection loses no way through the water, for a glider
 that is led into it, but it takes ``lead_s`` longer than its way does, and the current acts on.
 """
 
@@ -36,7 +36,7 @@ def way_left(s, e1, speed, current_n, current_e, enough_s, path):
 
     ``s`` (m) is the parameter of the virtual target, ``e1`` (m) by how much the vehicle is
     ahead of it, ``speed`` (m/s) the horizontal one through the water in a glide; the current
-    is in m/s. More than ``enough_s`` (s) is told as infinite: legs that are far away are not
+    is in m/s. More than ``enough_s`` (s) is given as infinite: legs that are far away are not
     looked at.
     """
     first, _ = path_piece(s, path)
@@ -83,7 +83,7 @@ def next_dive(left, depth, surfaced, lead_s, dives, is_first, params):
         left_s += top / rate
     turns_s = 2.0 * lead_s * left.drift
     dive_s = 2.0 * (params.depth - top) / rate + turns_s
-    lost_s = 0.0  # by the stay at the surface before the next
+    lost_s = 0.0  # by the surface interval before the next
     if params.surface_every > 0 and (dives + 1) % params.surface_every == 0:
         lost_s = -min(0.0, left.drift) * TICK_S * (params.wait_ticks + params.prepare_ticks)
     if dive_s <= lost_s:

@@ -31,11 +31,11 @@ from glider_model.onboard.glide_polar import Polar, glide_vertical_rate
 PITCH_OVER = 0.5
 #: A vehicle that goes so fast (m/s) the new way, or at half of its glide's rate, has turned.
 TURNED_MPS = 0.05
-#: Largest lead that is believed, in leads by the vehicle's file.
+#: Largest lead that is used, in leads by the vehicle's file.
 LEAD_RANGE = 6.0
-#: The flight model is believed this long after a glide began (s), or after this share of it.
+#: The flight model holds this long after a glide began (s), or after this share of it.
 SETTLED_S, SETTLED_SHARE = 120.0, 0.3
-#: A bottom that is heard for longer than this is there, and no fish or bubble.
+#: A bottom that echoes for longer than this is there, and no fish or bubble.
 NEAR_TICKS = round(3.0 / TICK_S)
 #: The path is looked at for so many full dives before its end.
 DIVES_AHEAD = 4.0
@@ -134,7 +134,7 @@ class ProfileParams(NamedTuple):
     surface_every: int  #: dives between waits on the surface; 0: after the last
     prepare_ticks: int
     wait_ticks: int
-    settled_s: float  #: the flight model is believed this long after a glide began (s)
+    settled_s: float  #: the flight model holds this long after a glide began (s)
     lead_s: float  #: way left once the pump starts, over the speed, by the file's pump (s)
     holds: bool  #: comes up, and waits at the surface
 
@@ -150,7 +150,7 @@ class ProfileState(NamedTuple):
 
     stage: int = SURFACE_PREPARATION
     ticks: int = 0  #: ticks in this stage
-    near_ticks: int = 0  #: for which the bottom has been heard too near for this dive
+    near_ticks: int = 0  #: for which the bottom has echoed too near for this dive
     dives: int = 0  #: dives completed
     aborted: bool = False
     lead_up_s: float = 0.0  #: lead of the turn at depth, as learnt from the last; 0: none yet (s)

@@ -5,7 +5,7 @@
 The records are those of the `mcap` package. What its own readers do message by message, a
 compiled scan does for a chunk at once: a flight of 30 h has ten million messages.
 
-Two kinds of harm are told apart. A file that was **cut**, as by a writer that was killed, reads as
+There are two kinds of harm. A file that was **cut**, as by a writer that was killed, reads as
 far as it goes, and `Bag.cut` says how far. A file that is **damaged** is refused, by an error that
 names the place: every checksum is tested, that of the data section as the file is opened. Where
 there is none (ros2 bag writes none) the records are compared with the summary, which has a

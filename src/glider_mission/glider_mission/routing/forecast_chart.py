@@ -65,7 +65,7 @@ class Forecast(NamedTuple):
     """What a route is planned by."""
 
     chart: Chart  #: of dives, as is observed
-    stays: np.ndarray  #: what stays at the surface add to it, float32[t, n, m, 2] (m/s)
+    stays: np.ndarray  #: what surface intervals add to it, float32[t, n, m, 2] (m/s)
     land: np.ndarray  #: where it is, bool[n, m]
     error_mps: float  #: that the current may have, rms of each part
 

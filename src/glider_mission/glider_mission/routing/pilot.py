@@ -80,13 +80,13 @@ class Pilot:
         self.orders: list[Order] = []  #: that it gave
 
     def order(self, tick: int, row: np.ndarray | None) -> Order | None:
-        """What the vehicle is told at a tick, a multiple of `LOOK_TICKS`, if anything.
+        """What the vehicle is ordered at a tick, a multiple of `LOOK_TICKS`, if anything.
 
         The row float64[ROW] is that of the tick before in the log; None: it begins.
         """
         t_s = round(tick * TICK_S, 1)
         if row is None:
-            return self._told(t_s, self._waypoints[0])
+            return self._order_for(t_s, self._waypoints[0])
         if not self._replans:
             return None
         place, target = (np.array([row[at + 1], row[at]]) for at in (_ODOM, _TARGET))
@@ -102,7 +102,7 @@ class Pilot:
             return None
         self._was_ordered = True
         self._look(t_s, place, row[_BELIEVED])
-        return self._told(t_s, place)
+        return self._order_for(t_s, place)
 
     def _pass(self, target: np.ndarray) -> None:
         """Note the waypoints that are passed, by the point of the route that guidance came to.
@@ -114,14 +114,14 @@ class Pilot:
         if self._next < len(self._waypoints) - 1 and math.dist(target, goal) < near_m:
             self._next += 1
 
-    def _look(self, t_s: float, place: np.ndarray, believed: np.ndarray) -> None:
-        """Note the current of the segment before the one that is over: this one is told later.
+    def _look(self, t_s: float, place: np.ndarray, estimated: np.ndarray) -> None:
+        """Note the current of the segment before the one that is over: this one is known later.
 
         Navigation takes a dive segment in when it leaves the surface after it.
         """
         (before_s, before), way = self._last, self._way
         self._last, self._way = (t_s, place), (0.5 * (t_s + before_s), *(0.5 * (place + before)))
-        east, north = float(believed[0]), float(believed[1])
+        east, north = float(estimated[0]), float(estimated[1])
         if way and math.isfinite(east) and math.isfinite(north) and (east or north):
             self._seen.append((*way, north, east))
 
@@ -140,7 +140,7 @@ class Pilot:
         later_s = spared.passed_s[-1] - fastest.passed_s[-1]
         return spared if later_s < _LATER_S else fastest
 
-    def _told(self, t_s: float, place: np.ndarray) -> Order | None:
+    def _order_for(self, t_s: float, place: np.ndarray) -> Order | None:
         """Order to follow the best route from a place; None where it follows that already."""
         seen = np.array(self._seen).reshape(-1, 5)
         forecast, error_km = self._forecast, self._scenario.forecast.error_km

@@ -41,8 +41,8 @@ _LEVELS = 21
 class Pace(NamedTuple):
     """How a vehicle gets on, by its glide polar and its profile."""
 
-    speed: float  #: through the water, horizontally, stays at the surface included (m/s)
-    cycle_s: float  #: from one stay at the surface to the next, or of a dive without one (s)
+    speed: float  #: through the water, horizontally, surface intervals included (m/s)
+    cycle_s: float  #: from one surface interval to the next, or of a dive without one (s)
     stay: float  #: share of the time that it is at the surface (-)
     cycle_wh: float | None  #: that it takes; None where the battery is not known
     dives: int  #: of a cycle

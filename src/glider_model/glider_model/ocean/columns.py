@@ -103,5 +103,5 @@ def _number(text: str, where: str) -> float:
 
 
 def is_height(depths: np.ndarray) -> bool:
-    """Whether depths are told as heights: none of them is below the surface, but some above it."""
+    """Whether depths are given as heights: none is below the surface, but some above it."""
     return bool(np.any(depths < 0.0) and not np.any(depths > 0.0))

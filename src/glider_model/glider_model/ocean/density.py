@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Density of the water: stratification, compression of water and hull, and the surface.
 
-What a vehicle weighs in it, `immersed`, is a slot by the kind of water: here the one that is told
+What a vehicle weighs in it, `immersed`, is a slot by the kind of water: here the one that is given
 by three numbers, in `glider_model.ocean.cast` a measured one.
 """
 

@@ -207,7 +207,7 @@ def _named(dataset: 'xarray.Dataset') -> dict[str, str | None]:
 
 
 def _listed(dataset: 'xarray.Dataset') -> str:
-    """Names of the variables that a file has, to be told."""
+    """Names of the variables that a file has, for messages."""
     return ', '.join(list(_named(dataset))[:12]) or 'none'
 
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The water of a mission beside its current: density, bottom, and what the wind does to a vehicle.
 
-The density is told by some numbers, by a cast, or by temperature and salinity of an ocean model,
+The density is given by some numbers, by a cast, or by temperature and salinity of an ocean model,
 in a file as CMEMS or HYCOM write it. Of these become density, by TEOS-10, and temperature in
 place. Between the points of the grid both are linear in place, depth and time; beyond its levels
 they are those of the first or the last.
@@ -197,7 +197,7 @@ class WaterSettings(DensitySettings):
             heaviest = max(heaviest, (depth, density), key=lambda row: row[1])
 
     def params(self) -> DensityParams | CastParams | ModelWaterParams:
-        """Kernel parameters of the density; their type says how it is told."""
+        """Kernel parameters of the density; their type says how it is given."""
         if self.grid.file:
             return self.grid.params(self.hull_compression_per_m)
         if self.profile is None:

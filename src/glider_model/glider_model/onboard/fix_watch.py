@@ -25,7 +25,7 @@ FALLS = 0.5
 FAST_MPS, FAR = 0.4, 4.0
 #: So many surfacings are remembered, as bits.
 REMEMBERED = 0b111111
-#: Nothing is believed that is larger (m, m/s, m^2).
+#: Nothing counts that is larger (m, m/s, m^2).
 MOST_M, MOST_MPS, MOST_M2 = 1e8, 10.0, 1e16
 
 
@@ -37,8 +37,8 @@ class FixWatch(NamedTuple):
 
     is_under: bool = False
     under_s: float = 0.0  #: time under water since the last fix
-    is_fixed: bool = False  #: there was a fix in this stay at the surface
-    place: Vector = _STILL  #: that was believed a tick before (m)
+    is_fixed: bool = False  #: there was a fix in this surface interval
+    place: Vector = _STILL  #: that was estimated a tick before (m)
     known: Covariance = _NONE  #: of it (m^2)
     jump: Vector = _STILL  #: at the fix of this stay, over the time under water (m/s)
     off: float = 0.0  #: the same as a distance, squared, over its variance
@@ -126,7 +126,7 @@ def _dive(watch):
 def watch_fixes(watch: FixWatch, odometry: Odometry, known: Covariance, dt: float) -> FixWatch:
     """Take in odometry and the covariance of its place (m^2) at a tick of ``dt`` s.
 
-    Anything may be in them; what cannot be believed changes nothing.
+    Anything may be in them; what is not plausible changes nothing.
     """
     x = odometry
     if not _is_plausible(x, known):

@@ -4,7 +4,7 @@
 
 A sample is refused if a number is not finite, the quaternion is none, a rate or the speed is
 beyond any glider's, or if it lies so far from where the last good one leads that no glider went
-there. After ``hold_s`` of refusals a sample that is good in itself is believed again, for then the
+there. After ``hold_s`` of refusals a sample that is good in itself counts again, for then the
 world has jumped (a fix, a new source); without one the measurement is lost.
 """
 
@@ -16,7 +16,7 @@ from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, derived, number, positive
 from glider_base.signals import Odometry
 
-#: Actuators that say they are farther out than this many ranges are not believed (-).
+#: Actuators that say they are farther out than this many ranges are not plausible (-).
 JOINT_RANGES = 1.5
 #: Deviation of a quaternion's squared norm from 1: from here it is scaled, from there refused (-).
 NORM_SCALED, NORM_REFUSED = 1e-9, 0.02
@@ -106,7 +106,7 @@ def is_plausible(odometry, params):
 
 
 @kernel
-def are_believed(joints, ranges):
+def are_plausible(joints, ranges):
     """Whether actuators can be where somebody says; false for NaN."""
     return (
         abs(joints.m_b) <= JOINT_RANGES * ranges.m_b

@@ -42,7 +42,7 @@ MODEL_VERTICAL_RATE = 0.05
 _SLOWEST = 0.05
 #: Where the search for a speed begins (m/s).
 _TYPICAL = 0.3
-#: Drag and lift polynomials are not believed beyond this angle of attack (rad), in steering and
+#: Drag and lift polynomials do not hold beyond this angle of attack (rad), in steering and
 #: where it is sought to the end.
 LARGEST_ALPHA, LARGEST_SOUGHT = math.radians(15.0), math.radians(40.0)
 #: Passes in which the angle of attack of most glides is found, and where drag changes with the

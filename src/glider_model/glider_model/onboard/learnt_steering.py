@@ -115,7 +115,7 @@ class Steering(NamedTuple):
     cube: float  #: u^3 (V / V_0)^n (-)
     sine_rate: float  #: u' (1/s)
     yaw_rate: float  #: (rad/s)
-    steady_s: float  #: time since the last turn-over (s)
+    steady_s: float  #: time since the last inflection (s)
     ratio: float  #: (V / V_0)^n of now (-)
 
 

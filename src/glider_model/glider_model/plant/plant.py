@@ -136,7 +136,7 @@ class InitialSettings(Settings):
 
 
 class PlantSettings(Settings):
-    """Everything the plant node is told."""
+    """Everything the plant node is set to."""
 
     vehicle: str = Field('zhang2021', description='vehicle by name, or path of its YAML file')
     water: WaterSettings = Field(
@@ -277,7 +277,7 @@ def _after_telling(state, faults, whole, params):
 
 @_after_telling.body(FaultParams)
 @kernel
-def _remember_what_was_told(state, faults, whole, params):
+def _remember_measured(state, faults, whole, params):
     return remembered(faults, tell(state, whole), whole.sensors) if params.repeats else faults
 
 

@@ -107,7 +107,7 @@ def solve_trim(
         z, solved = _follow_branch(z, glide)
         if solved:
             break
-    return _told(z, solved, glide)
+    return _trim_of(z, solved, glide)
 
 
 def _unpack(z: np.ndarray, glide: _Glide):
@@ -148,7 +148,7 @@ def _follow_branch(z: np.ndarray, glide: _Glide) -> tuple[np.ndarray, bool]:
     return z, solved
 
 
-def _told(z: np.ndarray, solved: bool, glide: _Glide) -> Trim:
+def _trim_of(z: np.ndarray, solved: bool, glide: _Glide) -> Trim:
     """The solution, in the units of a person."""
     u, v, w, theta, phi, rate, x_p = (float(number) for number in _unpack(z, glide))
     speed = math.sqrt(u * u + v * v + w * w)

@@ -84,7 +84,7 @@ def with_coefficients(values):
         raise ValueError(f'{twice[0]}: follows from {name} (allowed: one of the two)')
     try:
         found = SETS[name].model_validate(values[name]).coefficients()
-    except ValueError:  # what is wrong with the set is told by its own fields
+    except ValueError:  # what is wrong with the set is named by its own fields
         found = dict.fromkeys(LIFT_AND_DRAG, 1.0)
     return values | {
         field: {'value': found[field], 'unit': unit, 'source': f'follows from {name}'}

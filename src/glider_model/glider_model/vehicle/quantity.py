@@ -62,7 +62,7 @@ def quantity(unit: str, also: Other | None = None, **limits: float) -> type[Sett
 def _model(value: tuple, unit: str, also: Other | None = None, **more) -> type[Settings]:
     """Model of a value, a field as of `pydantic.create_model`, with its unit and source."""
     name = f'{unit} or {also.unit}' if also else unit
-    others = {'others': ', '.join(_told(unit, also))}
+    others = {'others': ', '.join(_choices(unit, also))}
     return pydantic.create_model(
         f'Quantity[{name}]',
         __base__=Settings,
@@ -73,7 +73,7 @@ def _model(value: tuple, unit: str, also: Other | None = None, **more) -> type[S
     )
 
 
-def _told(unit: str, also: Other | None) -> list[str]:
+def _choices(unit: str, also: Other | None) -> list[str]:
     """What is said of a unit that is not the one of a number."""
     return ([f"or '{also.unit}'"] if also else []) + ([HINTS[unit]] if unit in HINTS else [])
 

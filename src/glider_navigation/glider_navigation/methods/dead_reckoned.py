@@ -3,8 +3,8 @@
 """Dead reckoning between fixes, as gliders navigate.
 
 Under water the place goes on with speed through the water, by pitch and depth, on the measured
-heading, and with the current that is believed. At the surface, fixes tell where the vehicle came
-up and how it drifts; what is left between that and the dead reckoning is current, and is believed
+heading, and with the current that is estimated. At the surface, fixes tell where the vehicle came
+up and how it drifts; what is left between that and the dead reckoning is current, and is used
 in the way to come. A surfacing without a fix is one point of a longer way.
 """
 
@@ -20,17 +20,17 @@ from glider_base.signals import Covariance, Odometry, Vector, minus, over, plus
 from glider_model.onboard.fix_watch import DIVES_M, SURFACES_M
 from glider_model.onboard.glide_polar import Polar, make_polar
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
-from glider_navigation import current_belief as belief
-from glider_navigation import flight_model, surface_stay
+from glider_navigation import current_estimate as estimate
+from glider_navigation import flight_model, surface_interval
 from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
-from glider_navigation.current_belief import TIDE, CurrentBelief, Regressors
+from glider_navigation.current_estimate import TIDE, CurrentEstimate, Regressors
 from glider_navigation.flight_model import INITIAL_FLIGHT, INITIAL_ZERO, Flight, Zero
 from glider_navigation.forecast import Forecast, Trust, forecast_at, make_forecast, squared, weigh
-from glider_navigation.method import Believed, NavigationMethodSettings, Start, method_step
+from glider_navigation.method import Estimate, NavigationMethodSettings, Start, method_step
 from glider_navigation.phase import AT_SURFACE, FIXED, UNDER_WATER
-from glider_navigation.surface_stay import Stay
+from glider_navigation.surface_interval import Stay
 
-#: Shorter than this (s) a way under water tells no current.
+#: Shorter than this (s) a dive segment tells no current.
 SHORTEST_WAY_S = 120.0
 
 
@@ -58,7 +58,7 @@ class DeadReckonedSettings(NavigationMethodSettings):
             polar=make_polar(vehicle, to_the_end=True),
             mass=make_moving_mass(vehicle),
             forecast=make_forecast(start.forecast, start.current == 'forecast'),
-            believes_current=start.current != 'none',
+            estimates_current=start.current != 'none',
             speed_variance=self.speed_error_share**2,
             heading_variance=math.radians(self.heading_error_deg) ** 2,
             is_weighed=self.speed_by == 'buoyancy',
@@ -68,10 +68,10 @@ class DeadReckonedSettings(NavigationMethodSettings):
         """At the surface, where the vehicle was put into the water."""
         place = Vector(start.p_n, start.p_e)
         way = Way(place, self.start_std_m**2)
-        stay = surface_stay.launched(place, self.start_std_m**2)
-        current, trust = belief.initial_belief(start.current == 'tidal'), Trust(1.0, 0.0)
+        stay = surface_interval.launched(place, self.start_std_m**2)
+        current, trust = estimate.initial_estimate(start.current == 'tidal'), Trust(1.0, 0.0)
         if start.current == 'forecast':
-            current = belief.initial_belief(False, start.forecast.error_std_mps)
+            current = estimate.initial_estimate(False, start.forecast.error_std_mps)
             trust = Trust(1.0, start.forecast.share_std**2)
         attitude = initial_attitude(start.vehicle)
         return DeadReckonedState(attitude, place, way, stay, current, trust)
@@ -83,7 +83,7 @@ class DeadReckonedParams(NamedTuple):
     polar: Polar
     mass: MovingMass
     forecast: Forecast
-    believes_current: bool
+    estimates_current: bool
     speed_variance: float  #: of the share by which speed is off
     heading_variance: float  #: (rad^2)
     is_weighed: bool  #: speed comes from pitch and buoyancy
@@ -93,12 +93,12 @@ _STILL = Vector(0.0, 0.0)
 
 
 class Way(NamedTuple):
-    """The way under water since the last fix."""
+    """The dive segment since the last fix."""
 
     begun: Vector  #: where that was (m)
     variance: float  #: (m^2)
     through: Vector = _STILL  #: way through the water, and by drift where nothing fixed it (m)
-    believed: Vector = _STILL  #: way by the current that was believed (m)
+    by_current: Vector = _STILL  #: way by the current that was estimated (m)
     forecast: Vector = _STILL  #: way by the current that was forecast (m)
     t_s: float = 0.0  #: time under water
     deepest: float = 0.0  #: depth that it led to (m)
@@ -114,15 +114,15 @@ class DeadReckonedState(NamedTuple):
     """Dead reckoning between two ticks."""
 
     attitude: AttitudeState
-    place: Vector  #: where the vehicle believes it is (m)
+    place: Vector  #: where the vehicle estimates it is (m)
     way: Way
     stay: Stay
-    current: CurrentBelief  #: beside what is believed of the forecast
+    current: CurrentEstimate  #: beside what is used of the forecast
     trust: Trust
     tick: int = 0
     flight: Flight = INITIAL_FLIGHT
     under: bool = False  #: it is under water
-    column: Vector = _STILL  #: mean of the forecast over the last way that told something (m/s)
+    column: Vector = _STILL  #: mean of the forecast over the last segment that showed it (m/s)
     depth: float = 0.0  #: that was shown last (m)
     zero: Zero = INITIAL_ZERO  #: what is shown at the surface
 
@@ -151,7 +151,7 @@ def place_covariance(way, current, trust, column, params):
     """Covariance of the place after a way (m^2)."""
     t = way.t_s
     known = way.variance + t * t * (
-        belief.mean_variance(current, _regressors(way)) + belief.wandered(current, t)
+        estimate.mean_variance(current, _regressors(way)) + estimate.wandered(current, t)
     )
     unlike = _unlike(way, current)
     n, e = t * unlike.n, t * unlike.e
@@ -166,23 +166,25 @@ def place_covariance(way, current, trust, column, params):
 
 @kernel
 def _learn(current, trust, column, way, stay, params):
-    """What is believed of current and forecast after the fixes of a stay."""
-    if way.t_s < SHORTEST_WAY_S or not params.believes_current:
+    """Estimates of current and forecast after the fixes of a surface interval."""
+    if way.t_s < SHORTEST_WAY_S or not params.estimates_current:
         return current, trust
     t = way.t_s
-    off = over(minus(minus(minus(stay.came_up, way.begun), way.through), way.believed), t)
+    off = over(minus(minus(minus(stay.came_up, way.begun), way.through), way.by_current), t)
     h, variance = _regressors(way), (way.variance + stay.known.cc) / (t * t)
     bias = 0.5 * (params.speed_variance + params.heading_variance)
     bias *= squared(_unlike(way, current))
     if trust.variance > 0.0 and current.way_s > 0.0:
         change = _change_of_forecast(way, column)
-        noise = belief.mean_variance(current, h) + belief.wandered(current, t) + bias + variance
+        noise = (
+            estimate.mean_variance(current, h) + estimate.wandered(current, t) + bias + variance
+        )
         weighed = weigh(trust, off, change, noise)
         more = weighed.share - trust.share
         off = plus(off, change, -more)
         current = replace(current, mean=plus(current.mean, column, -more))
         trust = weighed
-    return belief.take_in(current, off, h, t, over(way.through, t), variance, bias), trust
+    return estimate.take_in(current, off, h, t, over(way.through, t), variance, bias), trust
 
 
 @kernel
@@ -192,7 +194,7 @@ def _dive(way, stay):
         before = way.deepest if way.t_s >= SHORTEST_WAY_S else way.before
         return replace(_NO_WAY, begun=stay.place, variance=stay.known.pp, before=before)
     drifted = minus(plus(way.through, stay.place), stay.came_up)
-    more = surface_stay.drifted_variance(stay)
+    more = surface_interval.drifted_variance(stay)
     return replace(way, variance=way.variance + more, through=drifted)
 
 
@@ -202,7 +204,7 @@ def _go_on(way, through, current, predicted, depth, t_s, dt):
     return replace(
         way,
         through=plus(way.through, through, dt),
-        believed=plus(way.believed, current, dt),
+        by_current=plus(way.by_current, current, dt),
         forecast=plus(way.forecast, predicted, dt),
         t_s=way.t_s + dt,
         deepest=max(way.deepest, depth),
@@ -213,40 +215,40 @@ def _go_on(way, through, current, predicted, depth, t_s, dt):
 
 @kernel
 def _at_the_top(place, t_s, current, trust, params):
-    """Current (m/s) that is believed for a place at the surface (m) and a time (s)."""
+    """Current (m/s) that is estimated for a place at the surface (m) and a time (s)."""
     predicted = forecast_at(params.forecast, place, 0.0, 0.0, t_s)
-    return plus(belief.current_at(current, t_s), predicted, trust.share)
+    return plus(estimate.current_at(current, t_s), predicted, trust.share)
 
 
 @kernel
 def _unforeseen(drift, place, t_s, current, trust, params):
-    """A drift (m/s) at a place (m) and time (s), less the water that is believed to be there."""
+    """A drift (m/s) at a place (m) and time (s), less the water that is expected to be there."""
     return minus(drift, _at_the_top(place, t_s, current, trust, params))
 
 
 @kernel
 def _carry(current, trust, stay, t_s, params):
-    """What is believed of the current as a stay ends, by how the drift has changed in it."""
+    """The current as a surface interval ends, by how the drift has changed in it."""
     if current.way_s <= 0.0:
         return current
     first = stay.first_drift
-    more, variance = surface_stay.change_of_drift(stay)
+    more, variance = surface_interval.change_of_drift(stay)
     then = _unforeseen(first, stay.came_up, t_s - stay.t_s, current, trust, params)
     now = _unforeseen(plus(first, more), stay.place, t_s, current, trust, params)
-    return belief.carry(current, minus(now, then), stay.t_s, variance)
+    return estimate.carry(current, minus(now, then), stay.t_s, variance)
 
 
 @kernel
 def _end_of(way):
     """Where a way has led to (m)."""
-    return plus(plus(way.begun, way.through), way.believed)
+    return plus(plus(way.begun, way.through), way.by_current)
 
 
 @kernel
 def _change_over(state, under, t_s, params):
     """Way, stay, current and trust in the forecast, after a dive or a surfacing if there is one.
 
-    Last comes the mean of the forecast over the last way that told something (m/s). ``under``
+    Last comes the mean of the forecast over the last dive segment that showed it (m/s). ``under``
     says whether the vehicle is under water now, ``state`` is of the tick before, ``t_s`` since
     the start.
     """
@@ -267,7 +269,7 @@ def _change_over(state, under, t_s, params):
         drift = stay.drift
         if stay.fixes <= 1:
             drift = _at_the_top(state.place, t_s, current, trust, params)
-        stay = surface_stay.begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
+        stay = surface_interval.begin(state.place, 0.5 * (covariance.nn + covariance.ee), drift)
     return way, stay, current, trust, column
 
 
@@ -298,20 +300,20 @@ def _odometry(place, attitude, flight, velocity):
 
 @method_step.body(DeadReckonedParams)
 @kernel
-def dead_reckoned_step(state, heard, params, dt):
+def dead_reckoned_step(state, received, params, dt):
     """Reckon on, or take fixes; see `method_step`."""
     t_s = state.tick * dt
     followed, attitude, sampled = attitude_step(
-        state.attitude, heard.imu, heard.joints, params.mass, dt
+        state.attitude, received.imu, received.joints, params.mass, dt
     )
-    is_new = sampled or heard.depth != state.depth
-    zero = flight_model.find_zero(state.zero, heard.depth, is_new, heard.fix.is_fix, dt)
+    is_new = sampled or received.depth != state.depth
+    zero = flight_model.find_zero(state.zero, received.depth, is_new, received.fix.is_fix, dt)
     flight = flight_model.set_anew(state.flight, state.zero.offset - zero.offset)
-    flight = flight_model.follow_depth(flight, heard.depth - zero.offset, is_new, dt)
-    flight = flight_model.at_the_surface(flight, heard.fix.is_fix)
+    flight = flight_model.follow_depth(flight, received.depth - zero.offset, is_new, dt)
+    flight = flight_model.at_the_surface(flight, received.fix.is_fix)
     if params.is_weighed:
         flight = flight_model.weigh_speed(
-            flight, attitude.angles.theta, heard.joints.m_b, params.polar, dt
+            flight, attitude.angles.theta, received.joints.m_b, params.polar, dt
         )
     else:
         flight = flight_model.reckon_speed(flight, attitude.angles.theta, params.polar, dt)
@@ -323,23 +325,23 @@ def dead_reckoned_step(state, heard, params, dt):
         # in the first dive nobody knows as yet how deep it will be
         deepest = max(way.before, way.deepest) if way.before > 0.0 else 0.0
         predicted = forecast_at(params.forecast, state.place, flight.depth, deepest, t_s)
-        water = plus(belief.current_at(current, t_s), predicted, trust.share)
+        water = plus(estimate.current_at(current, t_s), predicted, trust.share)
         way = _go_on(way, through, water, predicted, flight.depth, t_s, dt)
         place, velocity = _end_of(way), plus(through, water)
         covariance = place_covariance(way, current, trust, column, params)
         phase = UNDER_WATER
     else:
-        stay = surface_stay.wait(stay, dt)
-        if surface_stay.counts(stay, heard.fix):
-            stay = surface_stay.hear_fix(stay, heard.fix)
+        stay = surface_interval.wait(stay, dt)
+        if surface_interval.counts(stay, received.fix):
+            stay = surface_interval.hear_fix(stay, received.fix)
         place, velocity, variance = stay.place, stay.drift, stay.known.pp
         covariance = Covariance(variance, 0.0, variance)
         phase = FIXED if stay.fixes > 0 else AT_SURFACE
-    wandering = current.p.mm + belief.wandered(current, current.way_s)
-    believed = Believed(
+    wandering = current.p.mm + estimate.wandered(current, current.way_s)
+    estimated = Estimate(
         odom=_odometry(place, attitude, flight, velocity),
         place=covariance,
-        current=plus(belief.last_mean(current), column, trust.share),
+        current=plus(estimate.last_mean(current), column, trust.share),
         current_covariance=Covariance(wandering, 0.0, wandering),
         surface=stay.drift,
         surface_covariance=Covariance(stay.known.vv, 0.0, stay.known.vv),
@@ -356,7 +358,7 @@ def dead_reckoned_step(state, heard, params, dt):
         current=current,
         trust=trust,
         column=column,
-        depth=heard.depth,
+        depth=received.depth,
         zero=zero,
     )
-    return state, believed
+    return state, estimated

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Position is measured, as by acoustics and a Doppler log: what is measured is believed.
+"""Position is measured, as by acoustics and a Doppler log: what is measured is the estimate.
 
 Who acts on odometry has a gate of his own, so that it is handed on as it is.
 
@@ -15,7 +15,7 @@ from glider_base.kernel import kernel, replace
 from glider_base.signals import TICK_S, Imu, Vector
 from glider_model.onboard.moving_mass import MovingMass, make_moving_mass
 from glider_navigation.attitude import AttitudeState, attitude_step, initial_attitude
-from glider_navigation.method import NONE, Believed, NavigationMethodSettings, Start, method_step
+from glider_navigation.method import NONE, Estimate, NavigationMethodSettings, Start, method_step
 from glider_navigation.phase import KNOWN
 
 
@@ -49,20 +49,20 @@ class KnownState(NamedTuple):
 
 
 _STILL = Vector(0.0, 0.0)
-_BELIEVED = Believed(13 * (0.0,), NONE, _STILL, NONE, _STILL, NONE, KNOWN)
+_BELIEVED = Estimate(13 * (0.0,), NONE, _STILL, NONE, _STILL, NONE, KNOWN)
 
 
 @method_step.body(KnownParams)
 @kernel
-def known_step(state, heard, params, dt):
-    """Believe what is measured; see `method_step`."""
-    odom, attitude = heard.odom, state.attitude
+def known_step(state, received, params, dt):
+    """Take what is measured; see `method_step`."""
+    odom, attitude = received.odom, state.attitude
     if not params.as_measured:
-        x = heard.odometry
+        x = received.odometry
         imu = Imu(
             q_w=x.q_w, q_x=x.q_x, q_y=x.q_y, q_z=x.q_z, p=x.p, q=x.q, r=x.r, has_rates=params.gyro
         )
-        attitude, now, _ = attitude_step(state.attitude, imu, heard.joints, params.mass, dt)
+        attitude, now, _ = attitude_step(state.attitude, imu, received.joints, params.mass, dt)
         q = quaternion_from_euler(now.angles.phi, now.angles.theta, now.angles.psi)
         odom = odometry_to_wire(
             replace(x, q_w=q[0], q_x=q[1], q_y=q[2], q_z=q[3], p=now.p, q=now.q, r=now.r)

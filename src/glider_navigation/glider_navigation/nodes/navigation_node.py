@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""Navigation as a node: sensors in; odom and what is believed of the current out."""
+"""Navigation as a node: sensors in; odom and the estimated current out."""
 
 import sys
 
@@ -15,7 +15,7 @@ FIX_MAX_KM = 2000.0
 
 
 class NavigationNode(BlockNode):
-    """Where the vehicle believes it is. Free-running, it is silent while a sensor is."""
+    """The estimate of where the vehicle is. Free-running, it is silent while a sensor is."""
 
     def __init__(self, **kwargs) -> None:
         super().__init__(NAVIGATION, **kwargs)

@@ -3,7 +3,7 @@
 """Certificates of the steering loop: one quadratic function for all vertices of a box of gains.
 
 The inequalities, and why they hold for all gains in the box, are those of docs/theory.md, 8. `lmi`
-proposes P. What is told is computed from P alone, and `verified` by eigenvalues here.
+proposes P. What is printed is computed from P alone, and `verified` by eigenvalues here.
 """
 
 import math
@@ -24,7 +24,7 @@ from glider_studies.bounds.steering_loop import (
     tick,
 )
 
-#: Times its limit that a signal that saturates may come to, and reach beside the path over the
+#: Times its limit that a signal that saturates may come to, and reach cross-track over the
 #: lookahead distance: the region is the best that some of these give.
 TRIED = ((1.0, 0.3), (1.0, 0.6), (1.5, 0.6), (2.0, 0.6))
 #: Condition of P, in states over their sizes, at which the search for a region begins.
@@ -38,7 +38,7 @@ _RATES = (0.75, 0.9, 1.05, 1.2, 1.35)
 
 
 class Gain(NamedTuple):
-    """How far an input of any shape moves the vehicle aside."""
+    """How far an input of any shape moves the vehicle cross-track."""
 
     p: np.ndarray
     rate: float  #: alpha (1/s)
@@ -52,7 +52,7 @@ class Region(NamedTuple):
     p: np.ndarray
     times: float  #: m, of the rate limits and of the integral's
     start: np.ndarray  #: (2, 2), V of a start (e, psi) at rest is [e, psi] start [e, psi]'
-    aside_m: float  #: start beside the path on its heading (m)
+    aside_m: float  #: start cross-track on its heading (m)
     turned: float  #: start on the path, turned (rad)
 
 

@@ -52,7 +52,7 @@ def drawn(region: Region, random: np.random.Generator) -> tuple[float, float]:
 
 
 def fly_start(glide: Glide, aside: float, turned: float) -> np.ndarray:
-    """|e| (m) of every tick, from a start beside the path (m, + starboard) and turned (rad)."""
+    """|e| (m) of every tick, from a start cross-track (m, + starboard) and turned (rad)."""
     north, east, heading = _course_of(glide)
     course = heading - turned
     north, east = north + aside * math.sin(course), east - aside * math.cos(course)

@@ -106,7 +106,7 @@ def _stage(held: HeldMission, ticks: int) -> int:
 
 def glides(vehicle: str) -> dict[str, Glide]:
     """A steady glide of each phase, by its name."""
-    load_vehicle(vehicle)  # what is wrong with it is told in its own words
+    load_vehicle(vehicle)  # what is wrong with it is named in its own words
     scenario = scenario_of(vehicle)
     state, params = mission_of(scenario)
     held = hold(state, params)

@@ -23,7 +23,7 @@ BOX = (0.7, 1.3)
 
 
 class SteeringLoop(NamedTuple):
-    """One phase: vehicle as it is believed to be, and gains of guidance and law there."""
+    """One phase: vehicle as it is estimated to be, and gains of guidance and law there."""
 
     speed: float  #: horizontal, through the water (m/s)
     b: float  #: turn rate over u at this speed (rad/s); of the real vehicle times the box
@@ -63,7 +63,7 @@ class Gains(NamedTuple):
     roll_rate: float = 1.0  #: of the roll filter
 
 
-#: A vehicle that is as it is believed to be, and nothing saturates.
+#: A vehicle that is as it is estimated to be, and nothing saturates.
 AS_LEARNT = Gains()
 
 

@@ -24,7 +24,7 @@ from glider_bringup.console import (
 from glider_studies.workers import workers_at_work
 
 app = typer.Typer()
-#: So many of the cells that failed are told one by one.
+#: So many of the cells that failed are named one by one.
 FAILURES_SHOWN = 5
 #: Fields over which a sweep can be drawn as a map.
 MAPPED = {'current.speed_kn', 'current.angle_deg'}

@@ -47,7 +47,7 @@ class Mission(NamedTuple):
 
 
 def due_s(depth_m: float) -> float:
-    """Time (s) within which a vehicle at a depth (m) is at the surface, once it is told to."""
+    """Time (s) within which a vehicle at a depth (m) is at the surface, once it is ordered to."""
     return SURFACE_S + depth_m / SURFACE_MPS
 
 

@@ -3,7 +3,7 @@
 """What became of a flight, by its true motion, and whether the vehicle had the means.
 
 Nothing here knows what the guard watches for. Whether pump and weight would have sufficed is
-flown: from some tick on, the plant alone, with the whole pump out, the weight let go and the mass
+flown: from some tick on, the plant alone, the whole pump out, drop weight released, the mass
 where it balances, at the climb stop, or there once the vehicle rises. Nobody can act on a fault
 before it shows: while the flight is, to the last bit, the one without that fault.
 """
@@ -44,7 +44,7 @@ _GUARD = COLUMNS['guard']
 
 
 class Truth:
-    """Takes log rows: true depth, what the guard told, and whether every number is finite."""
+    """Takes log rows: true depth, what the guard reported, and whether every number is finite."""
 
     def __init__(self) -> None:
         self._depth: list[np.ndarray] = []
@@ -67,7 +67,7 @@ class Truth:
 
     @property
     def rows(self) -> np.ndarray:
-        """Rows that the guard told, once a second."""
+        """Rows that the guard reported, once a second."""
         return np.concatenate(self._rows)
 
 
@@ -172,7 +172,7 @@ def _lost(scenario: Scenario, truth: Truth) -> str:
 
 
 def _late(scenario: Scenario, truth: Truth, begun_s: list[float]) -> str:
-    """Why a vehicle is late that was told to surface for good and could have.
+    """Why a vehicle is late that was sent to the surface for good and could have.
 
     A fault that strikes one that is up gives it its time anew, from when it has sunk it again: a
     slow leak takes hours to.
@@ -228,9 +228,9 @@ def _hangs(depth: np.ndarray) -> bool:
 
 
 def unfounded(scenario: Scenario, truth: Truth, rows: int) -> int:
-    """Those of some rows that were told of a vehicle that truly went up or down.
+    """Those of some rows that were reported of a vehicle that truly went up or down.
 
-    None is, where the first was told of one that its whole pump does not bring up.
+    None is, where the first was reported of one that its whole pump does not bring up.
     """
     found, reported, stands_s = 0, truth.rows, round(STANDS_S)
     for bit in (1 << at for at in range(rows.bit_length()) if rows & 1 << at):

@@ -28,7 +28,7 @@ class Flown(NamedTuple):
 
     verdict: Verdict  #: with its faults
     faults: list[dict[str, Any]]  #: the smallest set that does the same harm
-    latched: str  #: what the guard told of the same mission without faults
+    latched: str  #: what the guard reported of the same mission without faults
     hours: float  #: of that mission
 
 

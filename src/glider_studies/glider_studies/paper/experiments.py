@@ -3,7 +3,7 @@
 """Every experiment: the paper's own, and what goes beyond them; flown, and judged.
 
 They are those of `experiments.yaml`. The tuned PID and the paper's line of sight are flown beside
-the adaptive law, and are told as they are; limits apply to the adaptive law. A change that makes
+the adaptive law, and are shown as they are; limits apply to the adaptive law. A change that makes
 anything worse turns a verdict to ``failed``.
 """
 
@@ -59,7 +59,7 @@ COMPARED_ON_PATHS = {
     'path_error_m.e3_max': 'e3\nmax (m)',
 }
 
-#: What a case in the file has that is told in its row.
+#: What a case in the file has that is shown in its row.
 _FACTS = ('reactions', 'beside_m', 'hours', 'dive_m', 'built_for')
 
 
@@ -104,7 +104,7 @@ class Experiment(NamedTuple):
     fly: Callable[[Any], Any] | None = None  #: what a worker does with a task
     tasks: dict[Hashable, Any] = {}
     loops: Collection[Combination] = ()  #: what they need
-    #: Rows, and what else is told of all flights, of what came of each task.
+    #: Rows, and what else is shown of all flights, of what came of each task.
     rows: Callable[[dict[Hashable, Any]], tuple[list[dict], dict[str, Any]]] | None = None
 
 
@@ -270,7 +270,7 @@ def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
 
 
 def _row(scores: dict[str, Any], failed: bool = False) -> dict[str, Any]:
-    """Scores with status; a number that is not finite becomes None, and is told."""
+    """Scores with status; a number that is not finite becomes None, and is named."""
     clean = finite(scores)
     whole = not failed and bool(scores['final_state']) and clean == scores
     return {'finite': whole, **clean, **({'status': 'failed'} if failed else {})}
@@ -295,7 +295,7 @@ def fly(
     """Fly all experiments, in worker processes.
 
     Returns rows by experiment and case; and the record of each case (None for what is not drawn),
-    or what else is told of a study.
+    or what else is shown of a study.
     """
     flown = pool.results(operator.call, _tasks(experiments), progress)
     found = []

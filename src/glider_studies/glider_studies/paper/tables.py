@@ -12,7 +12,7 @@ from rich.table import Table
 from glider_studies.paper.experiments import PASSED, by_case, compared, described, is_better
 from glider_studies.paper.judges import figure_of
 
-#: Failed checks that are listed; of more only the number is told.
+#: Failed checks that are listed; of more only the number is shown.
 LISTED = 12
 #: Marks a figure in which another law is better than the adaptive law.
 BETTER = '*'

@@ -7,7 +7,7 @@ below rclpy, by the function of rcl that rclpy takes it by. Its interface is fix
 distribution of ROS 2 (REP-2004, ABI stability), this is that of Jazzy.
 
 Only where the middleware is Fast DDS are the gids of messages those of the publishers that it
-lists; with another one nobody is told apart.
+lists; with another one nobody can be distinguished.
 """
 
 import ctypes

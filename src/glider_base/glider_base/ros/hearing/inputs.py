@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a node hears: one subscription with what it brought last, and what of it is believed."""
+"""Inputs of a node: one subscription with what it brought last, and what of it is accepted."""
 
 import math
 import time
@@ -15,7 +15,7 @@ NOT_UNIT = 0.1
 #: A battery that says that it has more of its capacity (-) counts in percent.
 MOST_CHARGED = 1.5
 
-#: A topic whose messages are refused is told of at most so often (s of wall time).
+#: A topic whose messages are refused is reported at most so often (s of wall time).
 _REFUSED_EVERY_S = 1.0
 
 
@@ -45,7 +45,7 @@ class Input:
         self.arrived_s = -float('inf')  #: on the clock of the cycles
         self.owner = Owner(topic, lockstep, stand_in)
         self.refused = 0  #: messages of other publishers, and such as cannot be used
-        self.refusal_shown_s = -float('inf')  #: wall time at which a refusal was told of last
+        self.refusal_shown_s = -float('inf')  #: wall time at which a refusal was reported last
         self.lost = 0  #: messages that lack between those that came
         self.late = 0  #: cycles that had to do with the input of the one before
         self.used_ns = -1

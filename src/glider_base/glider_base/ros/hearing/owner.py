@@ -3,10 +3,10 @@
 """Whose a topic is: of all who publish it, the one that is obeyed.
 
 In lockstep it is the node that the wiring says, for good. Free-running, what the blocks say is
-theirs too; what a vehicle says (its sensors, where it is) is that of whoever is heard first, under
+theirs too; what a vehicle says (its sensors, where it is) is that of whoever speaks first, under
 any name, until it is gone. One that falls silent is followed by the next of its name: a driver
 that has crashed and was started again. Who has no name yet is waited for.
-Who has spoken while the owner did is never believed.
+Who has spoken while the owner did is never obeyed.
 """
 
 from collections.abc import Mapping
@@ -18,7 +18,7 @@ from glider_base.wiring import NAVIGATION, PLANT
 
 #: Blocks in the place of which a vehicle may publish, under a name of its own.
 _VEHICLE = (PLANT.node, NAVIGATION.node)
-#: Wall time (s) within which the middleware tells the name of a node that is heard.
+#: Wall time (s) within which the middleware tells the name of a node that speaks.
 NAMED_WITHIN_S = 10.0
 
 
@@ -41,7 +41,7 @@ class Owner:
         self.gid = b''  #: of the owner; empty as long as there is none
         self.name = ''  #: full name of its node, as far as it is known
         self.before = ''  #: name of the owner before it
-        self.heard_s = -float('inf')  #: when it was heard last
+        self.heard_s = -float('inf')  #: when it spoke last
         self._strangers: set[bytes] = set()  #: have spoken while it did
         self._new: dict[bytes, float] = {}  #: have spoken since it did, and when at first
 
@@ -114,5 +114,5 @@ class Owner:
             self.gid = b''
 
     def restart(self) -> None:
-        """Forget an owner of which nothing was heard that counts."""
+        """Forget an owner that has said nothing that counts."""
         self.gid, self.name = b'', ''

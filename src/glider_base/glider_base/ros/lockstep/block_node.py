@@ -109,7 +109,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        """Leave when the watch looks next: what is raised here is not heard."""
+        """Leave when the watch looks next: what is raised here is lost."""
         self.over_since_s = time.monotonic() - FAREWELL_S
         return TransitionCallbackReturn.SUCCESS
 

@@ -4,7 +4,7 @@
 
 Two kinds of status: events of the flight (stage, saturation, failsafe) on /diagnostics, which are
 recorded, and the state of a node as a member of the lockstep (`Report`) on ``lockstep``, by which
-the peers of one namespace find each other. What changes is told as an event. A `Pulse` repeats
+the peers of one namespace find each other. What changes is an event. A `Pulse` repeats
 what holds once in a second, for tools that take silence for a failure, and is not recorded.
 """
 
@@ -83,7 +83,7 @@ def report_array(report: Report) -> DiagnosticArray:
 
 
 class EventCount(NamedTuple):
-    """How many events a node has told of up to a tick: without them a recording is not whole."""
+    """How many events a node has reported up to a tick: without them a recording is not whole."""
 
     node: str  #: full name
     events: int  #: since it was started

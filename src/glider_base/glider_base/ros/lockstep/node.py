@@ -41,9 +41,9 @@ from glider_base.wiring import WHEN_SILENT
 
 #: A node looks for its peers this often (s), and after a while in so small a share of its wait.
 _STARTUP_PERIOD_S, _STARTUP_SHARE = 0.03, 0.02
-#: A node in lockstep says after so many ticks how many events it has told of.
+#: A node in lockstep says after so many ticks how many events it has reported.
 COUNT_TICKS = 64
-#: Who starts a node by hand is told what it waits for, after this time and then this often (s).
+#: Who starts a node by hand reads what it waits for, after this time and then this often (s).
 _PATIENCE_S, _REMIND_S = 10.0, 20.0
 _QUIET_PUBLISHER = PublisherEventCallbacks(use_default_callbacks=False)
 _QUIET_SUBSCRIPTION = SubscriptionEventCallbacks(use_default_callbacks=False)

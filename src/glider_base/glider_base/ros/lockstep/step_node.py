@@ -15,7 +15,7 @@ from glider_base.wiring import SAMPLED, SLOW_S, WHEN_SILENT
 #: Samples of attitude and pressure are old after so many periods: two in a row may be missed.
 OLD_AFTER = 3.0
 _COUNTED = ('lost', 'late')
-#: With use_sim_time: nobody acts, and that is told, when the time has stood still for so long (s).
+#: With use_sim_time: nobody acts, and says so, when the time has stood still for so long (s).
 _STANDS_S = 5.0
 _TELL_EVERY_S = 10.0
 #: So far (in ticks) the steps may be ahead of the stamps before one is left out.
@@ -65,7 +65,7 @@ class StepNode(TickNode):
         self._cycle_s: float | None = None
         StepNode.forget(self)  # its own alone: a subclass has made nothing yet
         self._stood = (0.0, time.monotonic())  #: time of the cycles, and since when it is that (s)
-        self._told = (0, 0, 0)
+        self._reported = (0, 0, 0)
         self._tell_s = -float('inf')
 
     def forget(self) -> None:
@@ -183,11 +183,11 @@ class StepNode(TickNode):
             item.used_ns = item.stamp_ns
         lost, late = (sum(getattr(item, kind) for item in ticking) for kind in _COUNTED)
         counted = lost, late, self.missed
-        if counted == self._told or self.now_s() < self._tell_s:
+        if counted == self._reported or self.now_s() < self._tell_s:
             return
-        is_worse = lost > self._told[0] or self.missed > self._told[2]
+        is_worse = lost > self._reported[0] or self.missed > self._reported[2]
         level = health.WARN if is_worse else health.OK
-        self._told, self._tell_s = counted, self.now_s() + _TELL_EVERY_S
+        self._reported, self._tell_s = counted, self.now_s() + _TELL_EVERY_S
         counts = {
             f'{item.topic.name}_{kind}': getattr(item, kind)
             for item in ticking
@@ -208,6 +208,6 @@ class StepNode(TickNode):
         """
 
     def close(self) -> None:
-        """Say goodbye if another node of this process has heard first that the run is over."""
+        """Say goodbye if another node of this process has learnt first that the run is over."""
         if self.running and self.over_since_s is None and self.context.ok():
             self.report(health.FINISHED)

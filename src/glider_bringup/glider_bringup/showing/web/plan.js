@@ -1,11 +1,11 @@
-// Where a vehicle was and where it believed to be, from above.
+// Where a vehicle was and its own estimate, from above.
 
 /** A 95 % ellipse: its radius squared over the variance, of two numbers (chi squared). */
 const ELLIPSE_95 = 5.991;
 /** Most surfacings that have their number beside them. */
 const NUMBERED = 25;
 
-/** Points of the 95 % ellipse around a believed place, to the east and north of it (m). */
+/** Points of the 95 % ellipse around an estimated place, to the east and north of it (m). */
 function ellipse({ covariance_m2: [nn, ne, ee] }) {
   const points = [];
   const a = Math.sqrt(ELLIPSE_95 * nn);
@@ -91,7 +91,7 @@ function farthestOff({ surfacings }) {
   return numbered.filter((one) => far.includes(one));
 }
 
-/** Where the vehicle came up, around where it believed to be: a small map for each, to scale. */
+/** Where the vehicle came up, around its own estimate: a small map for each, to scale. */
 function drawPlaces(panel, element) {
   const shown = farthestOff(page.runs[0]);
   const room = root.classList.contains('paper') ? ON_PAPER : ON_SCREEN;

@@ -30,7 +30,7 @@ _PER_TICK = [topic.name for topic in TOPICS.values() if topic.per_tick]
 class LogWriter:
     """Writes the log rows of a direct run as the messages that the nodes would have published.
 
-    The settings are what guidance is told before the first tick; ``topics`` are those that not
+    The settings are those of guidance before the first tick; ``topics`` are those that not
     every run has and this one does; ``steers_by`` names the vehicle's steering surface, and is
     empty without.
     """

@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the nodes of a recorded run were told: their settings, from wherever they stand."""
+"""The settings of the nodes of a recorded run, from wherever they stand."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -19,7 +19,7 @@ OLD_S = TickSettings().input_max_age_s
 
 
 class NodeSettings(NamedTuple):
-    """What the nodes of a recorded run were told."""
+    """Settings of the nodes of a recorded run."""
 
     blocks: dict[str, Settings | None]  #: by name of the block; None: it is not known
     source: str  #: where it stands

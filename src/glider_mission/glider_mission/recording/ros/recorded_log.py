@@ -15,7 +15,7 @@ from glider_base.ros.wire.codec import Codec
 from glider_base.ros.wire.topics import TOPICS, Topic, topic_of
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
-from glider_base.wiring import BELIEFS, SENSORS, WHEN_SILENT
+from glider_base.wiring import ESTIMATES, SENSORS, WHEN_SILENT
 from glider_guidance.yo.stage import STAGE_NAMES
 from glider_mission.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_mission.recording.mcap_reader import Bag, Batch
@@ -121,7 +121,7 @@ class RecordedLog:
         self._topics = [getattr(known.get(one.name), 'name', one.name) for one in bag.topics]
         self._names = (*SCORED, *also)
         self._codecs = {name: topic_of(name, steers_by).codec for name in self._names}
-        #: Tick, column and new value, in the order in which they were told.
+        #: Tick, column and new value, in the order in which they came.
         self._flags: list[tuple[int, str, float]] = []
         self._unusable: dict[tuple[str, int], str] = {}
         self.lacks = ''  #: or what the first tick lacks that is not whole, in words
@@ -256,7 +256,7 @@ class RecordedLog:
 
     def recorded(self) -> dict[str, int]:
         """Messages of every topic that ought to have one per tick, by topic."""
-        left_out = {*SENSORS, *BELIEFS, *WHEN_SILENT}.difference(self._topics)
+        left_out = {*SENSORS, *ESTIMATES, *WHEN_SILENT}.difference(self._topics)
         if not self.counts['ground_truth/odom']:
             left_out |= {'ground_truth/odom'}
         names = (topic.name for topic in _PER_TICK if topic.name not in left_out)
@@ -264,7 +264,7 @@ class RecordedLog:
 
 
 class Reader(Protocol):
-    """A taker that also says what it needs, so that no more is read from a bag."""
+    """A sink that also says what it needs, so that no more is read from a bag."""
 
     topics: tuple[str, ...]  #: that it needs, beside those of the score
 
@@ -275,18 +275,18 @@ class Reader(Protocol):
 def read_back(
     bag: Bag,
     vehicle: str,
-    takers: Iterable[Reader],
+    sinks: Iterable[Reader],
     progress: Callable[[int], None] = lambda ticks: None,
 ) -> RecordedLog:
-    """Give the rows of a bag of a vehicle to takers; ``progress`` gets the ticks read.
+    """Give the rows of a bag of a vehicle to sinks; ``progress`` gets the ticks read.
 
     A `ConfigurationError` says where the bag is damaged.
     """
-    takers = tuple(takers)
-    also = {topic for taker in takers for topic in taker.topics}
+    sinks = tuple(sinks)
+    also = {topic for sink in sinks for topic in sink.topics}
     log = RecordedLog(bag, also, load_vehicle(vehicle).steers_by)
     for rows in log.blocks():
-        for taker in takers:
-            taker.add(rows)
+        for sink in sinks:
+            sink.add(rows)
         progress(log.ticks)
     return log

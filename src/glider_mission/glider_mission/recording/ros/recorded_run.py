@@ -107,7 +107,7 @@ class Recording:
         self.events: list[Event] = []
         self.recorded = set()  #: names of topics that are there, with or without messages
         self.ignored: list[str] = []  #: topics that are not ours, or of another type
-        takers: dict[int, Callable] = {}
+        sinks: dict[int, Callable] = {}
         for index, recorded in enumerate(bag.topics):
             topic = known.get(recorded.name)
             if topic is None or recorded.type_name != topic.type_name:
@@ -116,13 +116,13 @@ class Recording:
             self.recorded.add(topic.name)
             if topic.per_tick:
                 self.series[topic.name] = Series(topic_of(topic.name, steers_by).codec)
-                takers[index] = self.series[topic.name].add
+                sinks[index] = self.series[topic.name].add
             elif topic.name == 'path':
-                takers[index] = lambda batch, chosen: self.paths.extend(map(batch.payload, chosen))
+                sinks[index] = lambda batch, chosen: self.paths.extend(map(batch.payload, chosen))
             elif topic.name == '/diagnostics':
-                takers[index] = self._add_events
+                sinks[index] = self._add_events
         for batch in bag.batches():
-            for index, take in takers.items():
+            for index, take in sinks.items():
                 chosen = np.flatnonzero(batch.topic == index)
                 if len(chosen):
                     take(batch, chosen)

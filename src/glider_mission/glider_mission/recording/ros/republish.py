@@ -30,7 +30,7 @@ from glider_base.wiring import present
 from glider_mission.recording.mcap_reader import Bag, BagTopic, Batch
 from glider_mission.recording.ros.recorded_log import namespaces
 
-#: Sleeps and waits are cut into pieces of this length (s), so that Ctrl-C is heard.
+#: Sleeps and waits are cut into pieces of this length (s), so that Ctrl-C is noticed.
 _PATIENCE_S = 0.1
 #: Nothing longer is replayed (s).
 MAX_DURATION_S = 1e8
@@ -149,7 +149,7 @@ def qos_of(topic: BagTopic) -> QoSProfile:
 
 def _profile(profile: dict) -> tuple[int, ReliabilityPolicy, DurabilityPolicy]:
     def policy(name: str, unknown):
-        """What is told, of the kind of that which is taken where nothing known is."""
+        """What is printed, of the kind of that which is taken where nothing known is."""
         kind, value = type(unknown), profile.get(name, 0)
         if isinstance(value, int):
             return kind(value) if value in (1, 2) else unknown
@@ -198,7 +198,7 @@ class _Output:
 
 
 def _wait_for_acks(publisher) -> None:
-    """Wait until every subscriber has what was published; Ctrl-C is heard."""
+    """Wait until every subscriber has what was published; Ctrl-C is noticed."""
     while not publisher.wait_for_all_acked(Duration(seconds=_PATIENCE_S)):
         pass
 
@@ -243,7 +243,7 @@ class _Count:
         self._events, self._newest_ns, self._reported_ns = 0, -TICK_NS, -TICK_NS
 
     def add(self, log_ns: int, name: str) -> None:
-        """Count a message of a topic; what there was is told now and then, when a tick is over."""
+        """Count a message of a topic; the count is published now and then, when a tick is over."""
         since_ns = abs(self._newest_ns - self._reported_ns)
         if log_ns != self._newest_ns and since_ns >= COUNT_TICKS * TICK_NS:
             self.tell()

@@ -72,7 +72,7 @@ def _with_faults(numbers, state, sensors, params):
 
 @kernel
 def remembered(faults, numbers, sensors):
-    """State of the faults for the tick after one of which these are the numbers told."""
+    """State of the faults for the tick after one of which these are the numbers measured."""
     return FaultState(faults.began, _seen(numbers[:5], sensors))
 
 

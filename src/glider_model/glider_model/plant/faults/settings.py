@@ -90,7 +90,7 @@ class FaultSettings(Settings):
 
     @property
     def numbers(self) -> Sequence[float]:
-        """What the kernels are told of it, four at most: its own numbers."""
+        """What the kernels get of it, four at most: its own numbers."""
         return [float(value) for value in self.own.values() if not isinstance(value, str)]
 
     @property
@@ -358,7 +358,7 @@ def check_fitted(
 ) -> None:
     """Refuse a fault of what there is not: an actuator, something measured, a topic.
 
-    The vehicle steers by that surface, and of `SENSORS` and `BELIEFS` there are these ``topics``.
+    The vehicle steers by that surface, and of `SENSORS` and `ESTIMATES` it has ``topics``.
     Raises ConfigurationError.
     """
     has = {

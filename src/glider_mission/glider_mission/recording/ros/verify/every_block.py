@@ -27,7 +27,7 @@ from glider_mission.recording.ros.verify.lockstep import in_lockstep
 
 
 def is_lockstep(recording: Recording, given: NodeSettings) -> bool:
-    """Whether the nodes kept step: as they were told or, if nobody says, by what it looks like.
+    """Whether the nodes kept step: as they were set to or, if nobody says, by what it looks like.
 
     That is: whether each output has every tick of its inputs as often as the first: once, mostly.
     """

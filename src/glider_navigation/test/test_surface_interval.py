@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from glider_base.signals import Vector
 from glider_navigation.method import Fix
-from glider_navigation.surface_stay import (
+from glider_navigation.surface_interval import (
     LOST_DRIFT_STD,
     _begin_aside,
     begin,

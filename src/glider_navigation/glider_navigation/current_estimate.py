@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is believed of the current, from the mean over each way under water (docs/theory.md, 4).
+"""The estimate of the current, from the mean over each dive segment (docs/theory.md, 4).
 
 A mean and, if that is asked for, a tide, by a Kalman filter. How much the mean wanders is learnt
 (innovation-based adaptive estimation, Mehra 1970). With the tide left out this is persistence: the
@@ -23,12 +23,12 @@ MEAN_STD, TIDE_STD = 0.3, 0.05
 #: How far a mean over 1.5 hours is off that of the 1.5 hours before, at first (m/s); how many ways
 #: that counts for; and from how many at most q is learnt.
 FIRST_CHANGE, FIRST_WEIGHT, MOST_WEIGHT = 0.05, 1.0, 4.0
-#: The mean over a way is no better known than this, however steady the sea: turn-overs, where the
+#: The mean over a way is no better known than this, however steady the sea: inflections, where the
 #: flight model does not hold, are not all alike (m/s).
 LEAST_STD = 0.0007
 #: No current is faster, in whatever scenario (m/s).
 FASTEST = MAX_SPEED_MPS
-#: From so long a stay at the surface on (s) the change of the drift counts: in shorter ones of two
+#: From so long a surface interval on (s) the change of the drift counts: in shorter ones of two
 #: recorded flights, modena and sg033, the current was forecast better without it.
 LONG_STAY_S = 7200.0
 #: What share of that change is the current's, at first, and how far it may be off (-).
@@ -58,8 +58,8 @@ class Uncertainty(NamedTuple):
 _STILL = Vector(0.0, 0.0)
 
 
-class CurrentBelief(NamedTuple):
-    """What is believed of the current."""
+class CurrentEstimate(NamedTuple):
+    """The estimate of the current."""
 
     p: Uncertainty
     mean: Vector = _STILL  #: (m/s)
@@ -75,52 +75,52 @@ class CurrentBelief(NamedTuple):
     gap_s: float = 0.0  #: time since then for which nothing tells how the current has changed
 
 
-def initial_belief(tide: bool, mean_std: float = MEAN_STD) -> CurrentBelief:
+def initial_estimate(tide: bool, mean_std: float = MEAN_STD) -> CurrentEstimate:
     """Nothing is known yet, but how far the mean may be off (m/s)."""
     tide2 = TIDE_STD * TIDE_STD if tide else 0.0
-    return CurrentBelief(Uncertainty(mean_std * mean_std, 0.0, 0.0, tide2, 0.0, tide2))
+    return CurrentEstimate(Uncertainty(mean_std * mean_std, 0.0, 0.0, tide2, 0.0, tide2))
 
 
 @kernel
-def _carried(belief, share):
+def _carried(estimate, share):
     """Mean (m/s) after the stays since, of whose drift a share was the current's."""
-    return plus(belief.mean, belief.drifted, share)
+    return plus(estimate.mean, estimate.drifted, share)
 
 
 @kernel
-def current_at(belief, t_s):
-    """Current (m/s) that is believed for a time since the start (s)."""
-    mean = _carried(belief, belief.follows.share)
-    if belief.p.aa <= 0.0:
+def current_at(estimate, t_s):
+    """Current (m/s) that is estimated for a time since the start (s)."""
+    mean = _carried(estimate, estimate.follows.share)
+    if estimate.p.aa <= 0.0:
         return mean
-    return plus(plus(mean, belief.cos, math.cos(TIDE * t_s)), belief.sin, math.sin(TIDE * t_s))
+    return plus(plus(mean, estimate.cos, math.cos(TIDE * t_s)), estimate.sin, math.sin(TIDE * t_s))
 
 
 @kernel
-def last_mean(belief):
-    """Mean (m/s) over the last way taken in, whatever the drift at the surface told since."""
-    h = belief.over
-    return plus(plus(belief.mean, belief.cos, h.cos), belief.sin, h.sin)
+def last_mean(estimate):
+    """Mean (m/s) over the last way taken in, whatever the drift at the surface showed since."""
+    h = estimate.over
+    return plus(plus(estimate.mean, estimate.cos, h.cos), estimate.sin, h.sin)
 
 
 @kernel
-def _apart_s(belief, way_s):
+def _apart_s(estimate, way_s):
     """Time (s) in which the mean over a way comes to differ from that of the way before."""
-    return (belief.way_s + way_s) / 3.0 + belief.gap_s
+    return (estimate.way_s + way_s) / 3.0 + estimate.gap_s
 
 
 @kernel
-def _grown(belief, time_s):
+def _grown(estimate, time_s):
     """Variance (m^2/s^2) by which the mean comes to differ in a time (s)."""
-    return belief.q * time_s * (1.0 + 1.0 / belief.weight)
+    return estimate.q * time_s * (1.0 + 1.0 / estimate.weight)
 
 
 @kernel
-def wandered(belief, way_s):
+def wandered(estimate, way_s):
     """Variance (m^2/s^2) by which the mean over a way differs from that of the way before."""
-    if belief.way_s <= 0.0:
+    if estimate.way_s <= 0.0:
         return 0.0
-    return _grown(belief, _apart_s(belief, way_s)) + LEAST_STD * LEAST_STD
+    return _grown(estimate, _apart_s(estimate, way_s)) + LEAST_STD * LEAST_STD
 
 
 @kernel
@@ -134,9 +134,9 @@ def _loaded(p, h):
 
 
 @kernel
-def mean_variance(belief, h):
+def mean_variance(estimate, h):
     """Variance (m^2/s^2) of the mean current over a way, by what is known."""
-    m, a, b = _loaded(belief.p, h)
+    m, a, b = _loaded(estimate.p, h)
     return h.one * m + h.cos * a + h.sin * b
 
 
@@ -150,35 +150,35 @@ def _bounded(current):
 
 
 @kernel
-def take_in(belief, off, h, way_s, glide, variance, bias):
-    """What is believed after a way of ``way_s`` s under water; ``belief`` is that before it.
+def take_in(estimate, off, h, way_s, glide, variance, bias):
+    """The estimate after a dive segment of ``way_s`` s; ``estimate`` is that before it.
 
-    ``off`` is the mean current over the way less what was believed (m/s), ``h`` its
+    ``off`` is the mean current over the way less what was estimated (m/s), ``h`` its
     `Regressors`, ``glide`` the mean velocity through the water (m/s). ``variance`` (m^2/s^2)
     is that of the measured mean, by that of the fixes; ``bias`` that of what speed and
     compass errors seem to be of current, and was not in the way before.
     """
-    wander = wandered(belief, way_s)
-    p = belief.p
+    wander = wandered(estimate, way_s)
+    p = estimate.p
     grown = replace(p, mm=p.mm + wander + bias)
     m, a, b = _loaded(grown, h)
     s = h.one * m + h.cos * a + h.sin * b + variance
-    drifted = belief.drifted
-    follows = weigh(belief.follows, off, drifted, s - _grown(belief, belief.gap_s))
-    more = follows.share - belief.follows.share
+    drifted = estimate.drifted
+    follows = weigh(estimate.follows, off, drifted, s - _grown(estimate, estimate.gap_s))
+    more = follows.share - estimate.follows.share
     off = plus(off, drifted, -more)
     k_m, k_a, k_b = m / s, a / s, b / s
-    q, weight = belief.q, belief.weight
-    if belief.way_s > 0.0:
+    q, weight = estimate.q, estimate.weight
+    if estimate.way_s > 0.0:
         known = s - wander
-        seen = (0.5 * (off.n * off.n + off.e * off.e) - known) / _apart_s(belief, way_s)
+        seen = (0.5 * (off.n * off.n + off.e * off.e) - known) / _apart_s(estimate, way_s)
         q = max(0.0, (weight * q + max(0.0, seen)) / (weight + 1.0))
         weight = min(MOST_WEIGHT, weight + 1.0)
-    mean = _carried(belief, follows.share)
-    return CurrentBelief(
+    mean = _carried(estimate, follows.share)
+    return CurrentEstimate(
         mean=_bounded(plus(mean, off, k_m)),
-        cos=plus(belief.cos, off, k_a),
-        sin=plus(belief.sin, off, k_b),
+        cos=plus(estimate.cos, off, k_a),
+        sin=plus(estimate.sin, off, k_b),
         p=Uncertainty(
             mm=grown.mm - k_m * m,
             ma=grown.ma - k_m * a,
@@ -199,16 +199,16 @@ def take_in(belief, off, h, way_s, glide, variance, bias):
 
 
 @kernel
-def carry(belief, change, stay_s, variance):
-    """What is believed after a stay at the surface of ``stay_s`` s.
+def carry(estimate, change, stay_s, variance):
+    """The estimate after a surface interval of ``stay_s`` s.
 
-    ``belief`` is that after the way before it. ``change`` (m/s) is that of the drift in the stay,
-    beyond what was believed to change, ``variance`` that of it by the fixes (m^2/s^2).
+    ``estimate`` is that before it. ``change`` (m/s) is that of the drift in the interval,
+    beyond what was expected to change, ``variance`` that of it by the fixes (m^2/s^2).
     """
     share = 0.0
     if stay_s >= LONG_STAY_S:
-        wander = belief.q * stay_s
+        wander = estimate.q * stay_s
         share = wander / (wander + variance)
-    drifted = plus(belief.drifted, change, share)
-    known = min(1.0, share * belief.follows.share)
-    return replace(belief, drifted=drifted, gap_s=belief.gap_s + (1.0 - known) * stay_s)
+    drifted = plus(estimate.drifted, change, share)
+    known = min(1.0, share * estimate.follows.share)
+    return replace(estimate, drifted=drifted, gap_s=estimate.gap_s + (1.0 - known) * stay_s)

@@ -1,10 +1,10 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""A stay at the surface: where the vehicle came up, where it is, and how it drifts, by its fixes.
+"""A surface interval: where the vehicle came up, where it is, and how it drifts, by its fixes.
 
 A Kalman filter and a fixed-point smoother, the same for both axes (docs/theory.md, 4). A fix where
 the vehicle can hardly be is set aside; another one beside it, later, says that the vehicle was
-there after all: what was believed of the place is forgotten, and both count.
+there after all: the estimate of the place is forgotten, and both count.
 """
 
 import math
@@ -17,15 +17,15 @@ from glider_base.signals import Vector, minus, over, plus
 FIX_EVERY_S = 60.0
 #: Least variance of a fix, also of one that says nothing of its own (m^2).
 LEAST_VARIANCE = 0.25
-#: Before the first fixes: standard deviation of the drift about what is believed (m/s).
+#: Before the first fixes: standard deviation of the drift about what is estimated (m/s).
 DRIFT_STD = 0.15
-#: The same where the place was believed wrongly, and so is the drift (m/s).
+#: The same where the place was estimated wrongly, and so is the drift (m/s).
 LOST_DRIFT_STD = 1.5
 #: Growth of the variance of the drift (m^2/s^3): by 0.03 m/s in an hour.
 DRIFT_WANDERS = 3e-7
 #: Where less than this share of what is known of its change is by fixes, they tell nothing.
 LEAST_BY_FIXES = 1e-6
-#: Farther from where the vehicle is believed to be than so many standard deviations, and than so
+#: Farther from where the vehicle is estimated to be than so many standard deviations, and than so
 #: far (m) and what it may have drifted otherwise since the last fix (m/s), a fix is set aside.
 FARTHEST_STD, FARTHEST_M, FASTEST_MPS = 6.0, 100.0, 1.5
 #: Another one this much later (s), and no farther from it than that, confirms it.
@@ -94,7 +94,7 @@ def drifted_variance(stay):
 def change_of_drift(stay):
     """Drift now less that as it came up (m/s), by the fixes alone, and its variance (m^2/s^2).
 
-    The filter believes that the drift changes little, and that is taken out of what it says.
+    The filter assumes that the drift changes little, and that is taken out of what it says.
     """
     before = DRIFT_WANDERS * stay.t_s
     variance = stay.known.vv - 2.0 * stay.known.dv + stay.known.dd
