@@ -32,6 +32,7 @@ try:  # imports take a second, in which Ctrl-C may come, and many files
     from glider_base.plugins import COMMANDS, offered, used
     from glider_bringup import commands
     from glider_bringup.console import messages
+    from glider_bringup.engines.interrupts import end_as_interrupt
     from glider_mission.disk import DiskError
 except KeyboardInterrupt:
     sys.exit(130)  # EXIT_INTERRUPTED, which may not be there yet
@@ -160,6 +161,7 @@ def main() -> int:
 
     So does trouble of the machine, such as a full disk, with exit code 1.
     """
+    signal.signal(signal.SIGTERM, end_as_interrupt)
     if sys.stdout is None:
         _tell('standard output is closed')
         return EXIT_FAILED

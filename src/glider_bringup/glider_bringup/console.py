@@ -28,6 +28,7 @@ from rich.text import Text
 
 from glider_base.errors import EXIT_INTERRUPTED, printable
 from glider_base.signals import TICK_S
+from glider_bringup.engines.interrupts import stopped_by
 from glider_control.settings import ControlLawSettings
 from glider_mission.changes import parse_assignment
 
@@ -235,9 +236,9 @@ def shares():
 
 @contextmanager
 def interrupt_shown():
-    """Ctrl-C ends what is done in the block, is said, and is the exit code."""
+    """Ctrl-C or SIGTERM ends what is done in the block, is said, and is the exit code."""
     try:
         yield
-    except KeyboardInterrupt:
-        messages.print('stopped by SIGINT', style='red')
+    except KeyboardInterrupt as error:
+        messages.print(stopped_by(error), style='red')
         raise typer.Exit(EXIT_INTERRUPTED) from None

@@ -30,7 +30,7 @@ from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError
 from glider_base.kernel import source_digest
 from glider_bringup.console import compiling, counter, messages
 from glider_bringup.engines.compiling import Tell, compile_loops
-from glider_bringup.engines.interrupts import interrupts_noted
+from glider_bringup.engines.interrupts import interrupts_noted, stopped_by
 from glider_mission.choices import Combination
 
 #: Tasks that are handed out ahead, for each thread of the workers.
@@ -198,7 +198,7 @@ def _interrupts_held_back() -> Iterator[None]:
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
     if interrupts:
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt(interrupts[0])
 
 
 def _local_cluster(workers: int, folder: str) -> LocalCluster:
@@ -282,8 +282,8 @@ def workers_at_work(
         ):
             yield pool, update
         return
-    except KeyboardInterrupt:
-        reason, code = 'stopped by SIGINT', EXIT_INTERRUPTED
+    except KeyboardInterrupt as error:
+        reason, code = stopped_by(error), EXIT_INTERRUPTED
     except WorkError as error:
         reason, code = str(error), EXIT_FAILED
     messages.print(reason + advice(), style='red', soft_wrap=True)

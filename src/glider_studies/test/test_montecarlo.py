@@ -449,27 +449,33 @@ def _descendants(pid):
 
 
 @pytest.mark.skipif(not os.path.isdir('/proc/self'), reason='needs /proc')
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGKILL])
-def test_no_worker_outlives_the_command(number):
-    """Ctrl-C goes to the whole group, as from a terminal; SIGKILL to the command alone."""
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_no_worker_outlives_the_command(number, tmp_path):
+    """Ctrl-C goes to the whole group, as from a terminal; the others to the command alone."""
     command = [sys.executable, '-m', 'glider_bringup.cli', 'montecarlo', '--controller', 'pid']
     process = subprocess.Popen(
-        command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, 'TMPDIR': str(tmp_path)},
     )
     try:
         end = time.monotonic() + 120.0
         while len(children := _descendants(process.pid)) < 2 + 1:  # workers, resource tracker
             assert time.monotonic() < end and process.poll() is None
             time.sleep(0.05)
-        if number == signal.SIGINT:
-            os.killpg(process.pid, number)
-            out, error = process.communicate(timeout=120.0)
-            assert (process.returncode, out) == (130, '')
-            assert 'stopped by SIGINT' in error
-            assert 'Traceback' not in error
-        else:
+        if number == signal.SIGKILL:
             process.kill()
             process.wait()
+        else:
+            (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
+            out, error = process.communicate(timeout=120.0)
+            assert (process.returncode, out) == (130, '')
+            assert f'stopped by {number.name}' in error
+            assert 'Traceback' not in error
+            assert not [*tmp_path.glob('glider-*')]
         end = time.monotonic() + 60.0
         while any(os.path.exists(f'/proc/{child}') for child in children):
             assert time.monotonic() < end

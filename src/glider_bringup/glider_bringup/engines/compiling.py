@@ -69,4 +69,4 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
             with shown_once(one, tell):
                 fly_held(hold(state, params), nothing, TICK_S)
             if interrupts:
-                raise KeyboardInterrupt
+                raise KeyboardInterrupt(interrupts[0])

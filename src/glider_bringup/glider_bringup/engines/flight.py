@@ -323,7 +323,7 @@ def fly(
                 if progress:
                     progress(ticks, float(-log[-1, 2]))
                 if interrupts:
-                    status, reason = 'aborted', 'stopped by SIGINT'
+                    status, reason = 'aborted', f'stopped by {interrupts[0]}'
                     break
         except FlightError as error:
             status, reason = 'failed', str(error)

@@ -71,7 +71,7 @@ def verify(
             def go_on(*done) -> None:
                 update(*done)
                 if noted:
-                    raise KeyboardInterrupt
+                    raise KeyboardInterrupt(noted[0])
 
             verdicts = list(verify_blocks(recording, given, wanted, go_on))
     report = report_of(bag, recording, given, verdicts)
