@@ -27,6 +27,7 @@ from glider_flights.folders import (
 from glider_flights.navigation import DENSITY
 from glider_flights.netcdf import SUFFIXES, fixes_of, names_of, opened, read, refuse_missing
 from glider_flights.record import (
+    DIVE_DEPTH_M,
     LONGEST_GAP_S,
     Flight,
     LogFile,
@@ -41,6 +42,7 @@ from glider_flights.record import (
 )
 from glider_flights.seaglider import DIVE_FILE, polar_of
 from glider_flights.slocum import POLAR
+from glider_model.ocean.columns import is_height
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import Vehicle
 
@@ -116,6 +118,10 @@ def _read(path: Path) -> LogFile:
         known['depth_m'] = np.where(np.isfinite(by_pressure), by_pressure, by_depth)
     needed = {key: wanted[key] for key in ('time', 'depth_m', 'pitch_rad')}
     refuse_missing(path, known, needed, 'along the time, of a flight in OG1 or CF')
+    if is_height(known['depth_m'][np.abs(known['depth_m']) > DIVE_DEPTH_M]):
+        raise ConfigurationError(
+            f"{path}: depths are below 0 all along (allowed: + down, or positive = 'up')"
+        )
     if 'heading_rad' in known:
         declination, note = _declination(known, fixes)
         known['heading_rad'] = known['heading_rad'] + declination

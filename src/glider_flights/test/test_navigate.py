@@ -665,6 +665,12 @@ def test_a_pitch_of_the_other_sign_is_refused(tmp_path):
             read(tmp_path, None, quiet)
 
 
+def test_a_depth_of_the_other_sign_is_refused(tmp_path):
+    data = og1(2)
+    data.assign(DEPTH=-data.DEPTH).to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    assert 'depths are below 0 all along (allowed: + down, or positive' in told(str(tmp_path))
+
+
 @pytest.mark.parametrize(
     ('name', 'values', 'unit', 'why'),
     [

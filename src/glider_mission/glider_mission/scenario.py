@@ -51,7 +51,7 @@ from glider_mission.changes import (
 from glider_mission.chart import charted, in_metres, uncharted
 from glider_mission.mafiles import from_folder, with_mafiles
 from glider_mission.rules import Rules
-from glider_model.ocean.bottom import BathymetrySettings
+from glider_model.ocean.bottom import BathymetrySettings, bottom_depth
 from glider_model.ocean.current_settings import CurrentSettings, SumOfCurrents
 from glider_model.ocean.field import Mission
 from glider_model.ocean.fields.grid import GridFileSettings
@@ -641,12 +641,6 @@ def _check_glide(scenario: Scenario) -> None:
         raise ConfigurationError(f'forecast.file = {scenario.forecast.file!r}: no such file')
     scenario.water.check_stable()
     PlantSettings(vehicle=scenario.vehicle, initial=scenario.initial).check()
-    start_m, bottom_m = scenario.initial.depth_m, scenario.water.bottom_m
-    if bottom_m and start_m > bottom_m and not scenario.bathymetry.file:
-        raise ConfigurationError(
-            f'initial.depth_m = {start_m:g}: below the bottom (allowed: <= {bottom_m:g} m, '
-            'water.bottom_m)'
-        )
 
 
 def _with_known_fields(scenario: Scenario) -> Scenario:
@@ -664,12 +658,18 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
                 check_ways(scenario, resolved, name == 'current' and not is_charted)
                 starts[f'{name}.field.file'] = resolved.start_s
         currents[name] = current.model_copy(update={'field': field})
-    bathymetry = scenario.bathymetry
+    bathymetry, initial = scenario.bathymetry, scenario.initial
+    bottom_m = scenario.water.bottom_m or math.inf
     if is_charted:
         with named_in('bathymetry.', ValueError):
             bathymetry = bathymetry.known()
-            scenario.bottom()
+            bottom_m = bottom_depth(initial.north_m, initial.east_m, scenario.bottom())
             check_ways(scenario, bathymetry.resolved(scenario.mission()), True)
+    if initial.depth_m > bottom_m:
+        raise ConfigurationError(
+            f'initial.depth_m = {initial.depth_m:g}: below the bottom '
+            f'(allowed: <= {bottom_m:g} m there)'
+        )
     water = scenario.water
     if water.grid.file:
         with named_in('water.grid.', ValueError):

@@ -60,11 +60,11 @@ def sea(path, east=lambda t, z: 0.0, land=None, hours=HOURS, latitudes=LATITUDES
     return {'current': {'field': {'kind': 'grid', 'file': str(path)}}}
 
 
-def bottom(path, east=0.025, name='elevation'):
-    """File of a bottom of 3000 m with an island of a width, in the layout of GEBCO or CMEMS."""
+def bottom(path, east=0.025, name='elevation', depth_m=3000.0):
+    """File of a bottom of a depth with an island of a width, in the layout of GEBCO or CMEMS."""
     latitudes, longitudes = np.arange(35.5, 36.51, 0.01), np.arange(121.5, 122.51, 0.01)
     y, x = np.meshgrid(latitudes, longitudes, indexing='ij')
-    height = np.where((abs(y - 36.0) < 0.025) & (abs(x - 122.0) < east), 20.0, -3000.0)
+    height = np.where((abs(y - 36.0) < 0.025) & (abs(x - 122.0) < east), 20.0, -depth_m)
     if name == 'deptho':
         height = np.where(height < 0.0, -height, np.nan)
     data = xarray.Dataset(
@@ -122,6 +122,13 @@ def test_a_mission_over_land_or_out_of_its_file_is_refused(
     with pytest.raises(ConfigurationError, match=rf'file .*f.nc: .*{says}'):
         mission(file, waypoints=waypoints, **changes)
     assert mission(file, waypoints=AWAY, **through([36.3, 122.0], [36.2, 122.2]))
+
+
+def test_a_start_below_the_bottom_of_a_chart_is_refused(tmp_path):
+    file = bottom(tmp_path / 'f.nc', depth_m=300.0)
+    assert mission(file, waypoints=AWAY, **{'initial.depth_m': 299.0})
+    with pytest.raises(ConfigurationError, match='301: below the bottom .allowed: <= 300 m'):
+        mission(file, waypoints=AWAY, **{'initial.depth_m': 301.0})
 
 
 @pytest.mark.parametrize('name', ['elevation', 'deptho'])

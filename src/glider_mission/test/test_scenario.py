@@ -282,7 +282,7 @@ def test_assignment_of_another_form_is_refused(text):
 def test_no_vehicle_starts_below_the_bottom():
     changes = {'water.bottom_m': 50.0, 'profile.depth_m': 40.0}
     assert load_scenario('current_8deg', {**changes, 'initial.depth_m': 50.0})
-    with pytest.raises(ConfigurationError, match=r'initial.depth_m = 80: .*<= 50 m, water'):
+    with pytest.raises(ConfigurationError, match=r'initial.depth_m = 80: .*<= 50 m there'):
         load_scenario('current_8deg', {**changes, 'initial.depth_m': 80.0})
 
 
