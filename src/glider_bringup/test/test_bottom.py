@@ -136,6 +136,18 @@ def test_a_vehicle_that_touches_comes_up_and_the_score_says_so():
     assert 120.0 / 0.5 < told['bottom']['t_s'] < told['sim_time_s']
 
 
+def test_a_vehicle_that_bobs_from_the_bottom_to_the_surface_has_not_dived(tmp_path):
+    """Over 6 m, and 0.5 m more on each kilometre north: so it does not stand still."""
+    axes = {'lat': [35.9, 36.3], 'lon': [121.9, 122.1]}
+    slope = xarray.DataArray([[0.0, 0.0], [-24.0, -24.0]], axes, name='elevation')
+    slope.assign_attrs(units='m').to_netcdf(tmp_path / 'slope.nc', engine='scipy')
+    fields = {'bathymetry.file': str(tmp_path / 'slope.nc'), 'dives': 0, 'duration_s': 6000.0}
+    fields |= {'origin.latitude_deg': 36.0, 'origin.longitude_deg': 122.0}
+    told = flown(**fields, current={'speed_mps': 0.1, 'direction_deg': 0.0})
+    assert told['bottom']['touched'] and not told['dives']
+    assert told['reason'].startswith('no dive flown, for which there was time')
+
+
 @pytest.mark.parametrize(
     ('name', 'vehicle', 'pitch_deg', 'heavy_kg'),
     [('survey', 'seawing', 45.0, 0.8), ('seaglider_1000m', 'seaglider', 40.0, 0.3)],

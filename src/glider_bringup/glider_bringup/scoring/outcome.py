@@ -196,21 +196,21 @@ class BottomWatch:
 
     def __init__(self, bottom: NamedTuple) -> None:
         self._bottom, self._ticks = bottom, 0
-        self._least_m, self._touched_tick = math.inf, None
+        self._least_m, self.touched_tick = math.inf, None  #: None: it has not touched
 
     def add(self, n: np.ndarray, e: np.ndarray, depth: np.ndarray) -> None:
         """Take in the true places of a block of ticks, float64[n] each (m)."""
         least_m, where = least_height(n, e, depth, self._bottom)
         self._least_m = min(self._least_m, least_m)
-        if self._touched_tick is None and least_m <= 0.0:
-            self._touched_tick = self._ticks + where
+        if self.touched_tick is None and least_m <= 0.0:
+            self.touched_tick = self._ticks + where
         self._ticks += len(depth)
 
     def result(self) -> dict[str, Any] | None:
         """Whether and when it touched the bottom first (s), and its least height over it (m)."""
         if not math.isfinite(self._least_m):
             return None
-        tick = self._touched_tick
+        tick = self.touched_tick
         at_s = None if tick is None else seconds(tick)
         return {'touched': tick is not None, 't_s': at_s, 'least_height_m': self._least_m}
 

@@ -368,7 +368,8 @@ class Scorer:
             return ''
         if dives < rules.dives:
             return f'dives flown, of those that there was time for: {dives} of {rules.dives}'
-        if rules.dives_at_all and not dives and not _dives_at_all(depth):
+        is_led_aground = self._bottom and self._bottom.touched_tick is not None
+        if rules.dives_at_all and not dives and (is_led_aground or not _dives_at_all(depth)):
             return 'no dive flown, for which there was time'
         if rules.dives_at_all and not ended and _idles(depth, rules):
             return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
