@@ -200,13 +200,14 @@ def test_who_has_arrived_is_told_something_there_and_has_arrived(told):
     assert (arrival['arrived'], arrival['t_s']) == (True, pytest.approx(up_s, abs=0.2))
 
 
-def test_a_run_that_is_over_before_another_path_is_ordered_is_unfinished():
+def test_a_run_that_is_over_before_an_order_says_so_and_without_another_path_is_unfinished():
     short = {'kind': 'straight', 'length_m': 300.0}
     changes = {'path': short, 'current.speed_kn': 0.0, 'duration_s': 9000.0}
     for order, status in (({'path': EAST}, 'unfinished'), ({'depth_m': 50.0}, 'completed')):
         told = glider.fly('survey', {**changes, 'orders': [{'at_s': 6000.0, **order}]}).score
         assert told['arrival']['arrived'] and told['sim_time_s'] < 6000.0
-        assert (told['status'], '6,000 s' in told['reason']) == (status, status == 'unfinished')
+        assert told['status'] == status and 'ordered' in told['reason']
+        assert told['reason'].endswith('at 6,000 s')
 
 
 @pytest.mark.parametrize('start', [(-3.0, 5.0), (3.0, -5.0)])

@@ -7,6 +7,7 @@ import json
 import matplotlib.image
 import numpy as np
 import pytest
+import xarray
 from typer.testing import CliRunner
 
 import glider_bringup as glider
@@ -145,6 +146,19 @@ def test_a_plan_tells_of_a_bottom_of_glides_not_steered_and_of_what_it_does_not_
     plan('survey', fields, as_json=True)
     told = json.loads(capsys.readouterr().out)['notes']
     assert len(told) == bool(note) and all(one.startswith(note) for one in told)
+
+
+def test_a_plan_says_that_there_is_no_way_round_land(tmp_path, capsys):
+    axes = {'lat': np.linspace(35.9, 36.3, 41), 'lon': np.linspace(121.0, 123.0, 2)}
+    height = np.where(abs(axes['lat'] - 36.06) < 0.001, 9.0, -900.0)
+    wall = xarray.DataArray(np.tile(height, (2, 1)).T, axes, name='z')
+    wall.assign_attrs(units='m').to_netcdf(tmp_path / 'wall.nc', 'w', engine='scipy')
+    over = [f'bathymetry.file={tmp_path}/wall.nc', 'guidance.route=planned']
+    over += ['path={kind: straight, length_m: 14000.0, at_end: stop}']
+    plan('survey', over, as_json=True)
+    told = json.loads(capsys.readouterr().out)
+    assert not told['reachable']
+    assert told['notes'] == ['no way round the land between waypoints is found in its time']
 
 
 def test_a_flight_whose_glides_are_not_steered_says_so_before_and_after(tmp_path):

@@ -83,9 +83,11 @@ def _notes(made: Any, scenario: Scenario) -> list[str]:
     notes = scenario.unsteered
     notes += [f'{count(orders, "order")} of the mission not counted'] if orders else []
     bottom_m = bottom_under(made.route.corners, scenario.bottom())
-    if bottom_m <= profile.depth_m and not profile.clearance_m:
+    if bottom_m <= 0.0:
+        notes.append('no way round the land between waypoints is found in its time')
+    elif bottom_m <= profile.depth_m and not profile.clearance_m:
         notes.append(f'dives to {profile.depth_m:,.0f} m touch a bottom at {bottom_m:,.0f} m')
-    if profile.clearance_m and bottom_m <= profile.clearance_m + profile.top_depth_m:
+    elif profile.clearance_m and bottom_m <= profile.clearance_m + profile.top_depth_m:
         notes.append(f'no dives where the bottom is {bottom_m:,.0f} m deep, for its clearance')
     return notes
 
