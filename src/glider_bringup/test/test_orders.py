@@ -121,6 +121,17 @@ def test_who_holds_waits_at_the_surface_until_it_is_told_to_resume():
     assert flight.restore(before).until('end', t_s=5000.0).name == 'end'
 
 
+@pytest.mark.parametrize(('at_s', 'more'), [(61.0, 0), (66.0, 0), (500.0, 1), (1200.0, 0)])
+def test_a_dive_counts_that_a_hold_ends_in_its_climb_and_none_that_it_cuts_short(at_s, more):
+    """As the first dive begins, down in it, and up: of two dives that there are to be."""
+    hold = {'orders': [{'at_s': at_s, 'hold': True}, {'at_s': 2600.0, 'resume': True}]}
+    yo = {'profile.depth_m': 100.0, 'profile.surface_every_dives': 1, 'profile.wait_s': 60.0}
+    run = glider.fly('slocum_shelf', {**yo, **hold, 'dives': 2, 'duration_s': 9000.0})
+    depth = run.to_xarray().ground_truth_odom_depth.values
+    down = depth > 20.0
+    assert np.sum(down[1:] & ~down[:-1]) == run.score['dives'] == 2 + more
+
+
 @pytest.mark.parametrize('start', [[0.0, 0.0], [-3000.0, 800.0]], ids=['on it', 'far before it'])
 def test_the_score_of_a_path_that_is_ordered_is_that_of_the_true_motion(start):
     """North, then east: the way along either, and how far off it was, whatever it believed."""

@@ -290,14 +290,16 @@ def profile_step(
             turn_depth=planned,
             depth=params.depth,
         )
-    climbed = state.stage == GLIDING_UP and not params.holds and not state.aborted
-    dives = state.dives + (1 if climbed else 0)
+    is_at_once = state.stage == INFLECTING_UP and stage == WAITING_ON_SURFACE
+    climbed = (state.stage == GLIDING_UP or is_at_once) and not state.aborted
+    # the climb of a dive that a hold cuts short is to count none
+    is_cut = params.holds and is_descending(state.stage) and stage == INFLECTING_UP
     return replace(
         state,
         stage=stage,
         ticks=0,
         near_ticks=0,
-        dives=dives,
+        dives=state.dives + climbed - is_cut,
         turn_depth=planned,
         depth=params.depth,
     )
