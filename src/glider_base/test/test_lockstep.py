@@ -653,6 +653,14 @@ def test_a_battery_that_counts_in_percent_is_refused_and_named():
     assert item.values[0] == 15.0
 
 
+def test_a_free_running_message_that_is_none_is_named_by_its_topic():
+    """By its stamp too, which says whether it was overtaken."""
+    item = Input(TOPICS['odom'], lockstep=False)
+    for raw in (b'nothing', item.topic.codec.encode(-1, 17 * (0.5,))):
+        with pytest.raises(MessageError, match='^odom: '):
+            item.accept_newest(raw, 0.0, 1.0)
+
+
 def test_parameter_that_there_is_not_is_refused_by_its_name(make_graph, context):
     graph = make_graph(lockstep=False)
     client_node = rclpy.create_node('client', namespace='/glider', context=context)

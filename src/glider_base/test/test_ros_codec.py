@@ -266,6 +266,13 @@ def test_a_stamp_of_more_nanoseconds_than_a_second_has_is_none():
             read(serialize_message(message))
 
 
+def test_a_stamp_from_before_the_beginning_of_time_is_none():
+    raw = ODOM.encode(-1, 13 * (0.0,))
+    for read in (ODOM.decode, ODOM.decode_stamp):
+        with pytest.raises(MessageError, match='stamp.sec is -1 '):
+            read(raw)
+
+
 def test_finite_numbers_whose_sum_overflows_are_taken():
     numbers = 13 * (1.7e308,)
     assert ODOM.decode(ODOM.encode(0, numbers)) == (0, numbers)

@@ -149,6 +149,17 @@ def test_nothing_is_cleared_while_nobody_knows_how_deep_the_vehicle_is(context, 
         guard.destroy_node()
 
 
+def test_what_comes_with_a_stamp_that_stands_still_is_told_from_what_does_not_come(flight):
+    vehicle = flight.vehicle
+    first = {}
+    vehicle.change = lambda name, raw: first.setdefault(name, raw) if name == 'odom' else raw
+    flight.until(lambda: vehicle.said('missing or stale: odom (its stamp stands still); '))
+    vehicle.says = {}
+    flight.until(lambda: vehicle.said('for good'))
+    flight.until(lambda: flight.guard.condition().message.startswith('missing or stale: '))
+    assert 'stands still' not in flight.guard.condition().message
+
+
 def test_control_that_is_configured_again_counts_anew_what_it_refuses(context):
     node, told = ControlNode(context=context), []
     try:

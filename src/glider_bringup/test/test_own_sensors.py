@@ -213,6 +213,16 @@ def test_fix_of_another_sea_is_refused_and_named(flight, degrees, far):
     assert abs(vehicle.north_m()) < 20.0
 
 
+@pytest.mark.parametrize('variances', [(-1.0, 1.0), (1.0, -1.0), (1e300, 1e300)])
+def test_fix_with_a_covariance_that_is_none_is_refused_and_named(flight, variances):
+    vehicle = flight.vehicle
+    vehicle.fix = fix = a_fix(100.0)
+    fix.position_covariance[0], fix.position_covariance[4] = variances
+    flight.until(lambda: vehicle.said('message refused: fix: position_covariance is '))
+    flight.go_on(20)
+    assert abs(vehicle.north_m()) < 20.0
+
+
 @pytest.mark.parametrize('number', [0.0, math.nan])
 def test_receiver_without_a_fix_is_heard_in_peace(flight, number):
     vehicle = flight.vehicle

@@ -35,6 +35,8 @@ AVERAGED = 100
 #: A smaller one is left: waves, and an antenna that is out before the hull is. It is less than the
 #: depth below which guidance takes a vehicle for surfaced. A larger one is no offset (m).
 LEAST_M, LARGEST_M = 0.9, 20.0
+#: Farther from the average (m) the vehicle is under way, or the crest of a wave.
+STEADY_M = 0.3
 
 
 class Flight(NamedTuple):
@@ -126,7 +128,7 @@ def find_zero(zero, depth, is_new, is_fix, dt):
         samples += 1
         shown = depth if samples == 1 else shown + (depth - shown) / min(samples, AVERAGED)
     offset = zero.offset
-    counts = fixed_s >= FIXED_S and samples >= LEAST_SAMPLES
+    counts = fixed_s >= FIXED_S and samples >= LEAST_SAMPLES and abs(depth - shown) < STEADY_M
     if counts and LEAST_M < abs(shown - offset) and abs(shown) <= LARGEST_M:
         offset = shown
     return Zero(fixed_s, samples, shown, offset)

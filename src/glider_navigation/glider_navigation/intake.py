@@ -32,6 +32,8 @@ from glider_navigation.method import Fix, Received
 REFUSAL_SHOWN_S = 2.0
 #: A fix that is the same to the last digit though the vehicle went down so far (m) is an old one.
 REPEATED_M = 1.0
+#: Nor is one that may be farther off than 100 km (m^2).
+VARIANCE_MAX = 1e10
 #: No fix.
 _NO_FIX = Fix(False, 0.0, 0.0, 0.0)
 #: Deeper or higher than this no sensor shows (m).
@@ -74,7 +76,8 @@ def _is_plausible(imu, params):
 @kernel
 def _is_fix(fix):
     """Whether a fix is one; false for NaN."""
-    return fix.is_fix and abs(fix.p_n) < 1e8 and abs(fix.p_e) < 1e8 and fix.variance >= 0.0
+    is_near = abs(fix.p_n) < 1e8 and abs(fix.p_e) < 1e8
+    return fix.is_fix and is_near and 0.0 <= fix.variance <= VARIANCE_MAX
 
 
 @kernel

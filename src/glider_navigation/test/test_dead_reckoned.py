@@ -271,6 +271,12 @@ def test_what_the_altimeter_says_is_no_echo_where_it_is_no_number():
         assert _first(altitude=altitude)[0].altitude == taken
 
 
+@pytest.mark.parametrize('variance', [-1.0, 1e300, math.inf, math.nan])
+def test_a_fix_that_does_not_say_where_it_is_is_none(variance):
+    told, refuses = _first(fix=Fix(True, 0.0, 0.0, variance))
+    assert (told.fix.is_fix, refuses) == (False, True)
+
+
 @pytest.mark.parametrize('side', [-1.0, 1.0])
 def test_no_depth_beyond_that_of_any_sea_is_taken_in(side):
     told, refuses = _first(depth=11_900.0 * side)

@@ -193,6 +193,16 @@ def test_an_offset_changes_by_more_than_waves_do(shown, then):
     assert zero_of([shown] * 102, zero_of([5.0] * 102)).offset == pytest.approx(then)
 
 
+@pytest.mark.parametrize('rate', [0.1, 0.3, -0.15])
+@pytest.mark.parametrize('period_s', [0.1, 4.0])
+def test_fixes_on_the_way_down_or_up_show_no_offset(rate, period_s):
+    """A receiver that goes on under water by itself; waves hide no offset for long."""
+    depths = 3.0 + (rate < 0.0) * 60.0 + rate * TICK_S * np.arange(4000)
+    assert zero_of(depths, period_s=period_s).offset == 0.0
+    waves = 8.0 + 1.5 * np.cos(2.0 * math.pi * np.arange(300) / 90.0)
+    assert zero_of(waves).offset == pytest.approx(8.0, abs=0.9)
+
+
 def test_an_offset_is_that_of_five_samples_and_averaged():
     assert zero_of([8.0] * 160, period_s=4.0).offset == 0.0
     assert zero_of([8.0] * 162, period_s=4.0).offset == pytest.approx(8.0)

@@ -241,7 +241,7 @@ class RecorderNode(TickNode):
             stamp_ns = item.topic.codec.decode_stamp(raw)
         except MessageError:
             return
-        if stamp_ns < 0 or not self.is_of_owner(item, info):
+        if not self.is_of_owner(item, info):
             return
         if self.ticks.lockstep and not self.begun:
             if stamp_ns > 0 and not self.is_replayed():

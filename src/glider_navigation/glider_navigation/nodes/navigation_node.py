@@ -9,6 +9,7 @@ from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import entry
 from glider_base.ros.wire.codec import MessageError
 from glider_navigation.block import NAVIGATION
+from glider_navigation.intake import VARIANCE_MAX
 
 #: Farther north or east of the origin, twice as far as a path may lead, there is no fix (km).
 FIX_MAX_KM = 2000.0
@@ -25,7 +26,7 @@ class NavigationNode(BlockNode):
         self.start_up()
 
     def check_fix(self, values: tuple[float, ...]) -> None:
-        """Refuse a fix by another origin, or whose latitude and longitude are swapped."""
+        """Refuse a fix by another origin, with degrees swapped, or with no use of its variance."""
         origin = self.settings.origin.params()
         far_km = max(map(abs, from_geodetic(*values[1:3], origin))) / 1e3
         if values[0] >= 0.0 and far_km > FIX_MAX_KM:
@@ -33,6 +34,11 @@ class NavigationNode(BlockNode):
                 f'latitude {values[1]:g}, longitude {values[2]:g}: {far_km:,.0f} km from the '
                 f'origin, {origin.latitude:g}, {origin.longitude:g} '
                 f'(allowed: <= {FIX_MAX_KM:,.0f} km)'
+            )
+        if values[0] >= 0.0 and not 0.0 <= min(values[3:]) <= max(values[3:]) <= VARIANCE_MAX:
+            raise MessageError(
+                f'position_covariance is {values[3]:g}, {values[4]:g} m^2 '
+                f'(allowed: 0 to {VARIANCE_MAX:g})'
             )
 
     @property

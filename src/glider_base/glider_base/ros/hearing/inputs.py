@@ -43,6 +43,7 @@ class Input:
         self.stamp_ns = -1
         self.values: tuple[float, ...] = ()
         self.arrived_s = -float('inf')  #: on the clock of the cycles
+        self.stood_s = -float('inf')  #: the same, of the last that had the stamp of the one before
         self.owner = Owner(topic, lockstep, stand_in)
         self.refused = 0  #: messages of other publishers, and such as cannot be used
         self.refusal_shown_s = -float('inf')  #: wall time at which a refusal was reported last
@@ -53,14 +54,17 @@ class Input:
         #: raises a `MessageError` if numbers cannot be what was measured
         self.check = _CHECKS.get(topic.name, lambda values: None)
 
-    def accept(self, raw: bytes) -> None:
-        """Keep a message; a `MessageError` names the topic if it cannot be used."""
+    def _read(self, raw: bytes) -> tuple[int, tuple[float, ...]]:
         try:
             stamp_ns, values = self.topic.codec.decode(raw, check_frames=True)
             self.check(values)
         except MessageError as error:
             raise type(error)(f'{self.named}: {error}') from None
-        self.stamp_ns, self.values = stamp_ns, values
+        return stamp_ns, values
+
+    def accept(self, raw: bytes) -> None:
+        """Keep a message; a `MessageError` names the topic if it cannot be used."""
+        self.stamp_ns, self.values = self._read(raw)
 
     def accept_newest(self, raw: bytes, now_s: float, max_age_s: float) -> None:
         """Keep a message in free-running mode, unless it was overtaken on its way.
@@ -68,13 +72,15 @@ class Input:
         A stamp that stands still does not refresh the input. One that is older than any input may
         be means that the clock of the vehicle has been set back. Errors are those of `accept`.
         """
-        before = self.stamp_ns
-        since_ns = self.topic.codec.decode_stamp(raw) - before
+        before, (stamp_ns, values) = self.stamp_ns, self._read(raw)
+        since_ns = stamp_ns - before
         if before >= 0 and -max_age_s * 1e9 <= since_ns < 0:
             return
-        self.accept(raw)
+        self.stamp_ns, self.values = stamp_ns, values
         if since_ns:
             self.arrived_s = now_s
+        else:
+            self.stood_s = now_s
         if before >= 0 and since_ns <= max_age_s * 1e9:
             self.lost += max(0, round(since_ns / TICK_NS) - 1)
 

@@ -152,7 +152,13 @@ class StepNode(TickNode):
         return super().condition()
 
     def _missing(self) -> str:
-        return f'missing or stale: {", ".join(self._stale)}; {self.when_stale}'
+        now_s, named = self.now_s(), []
+        for item in self.inputs:
+            name = item.topic.name
+            if name in self._stale:
+                stands = now_s - item.stood_s <= self.max_age_s(name)
+                named.append(f'{name} (its stamp stands still)' if stands else name)
+        return f'missing or stale: {", ".join(named)}; {self.when_stale}'
 
     def _cycles_since(self, now_s: float) -> int:
         """Cycles that there should have been since the last one, this one included."""

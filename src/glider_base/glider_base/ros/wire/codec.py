@@ -285,6 +285,8 @@ class Codec:
 
 def _stamp_ns(sec: int, nanosec: int) -> int:
     """Stamp in ns; a `MessageError` if it is none."""
+    if sec < 0:
+        raise MessageError(f'stamp.sec is {sec} (allowed: >= 0)')
     if nanosec >= _SECOND_NS:
         raise MessageError(f'stamp.nanosec is {nanosec} (allowed: < {_SECOND_NS})')
     return sec * _SECOND_NS + nanosec
