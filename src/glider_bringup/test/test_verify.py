@@ -383,6 +383,18 @@ def test_an_input_that_shows_only_some_steps_later_is_found_by_trying(short_run,
     assert (found.ticks, found.compared['demand'], found.differing) == (100, 100, {})
 
 
+def test_what_a_vehicle_need_not_say_is_not_missed_where_it_flies_freely(short_run, tmp_path):
+    """To record it would not help: when it was taken for silent is on no record."""
+    bag = Bag(short_run)
+    recording = Recording(bag, None, lambda share: None)
+    del recording.series['health'], recording.series['battery']
+    given = read_settings(bag, short_run, None, tmp_path)
+    for lockstep, why in ((True, 'health and battery'), (False, 'free-running: which inputs')):
+        said = given._replace(lockstep=lockstep)
+        (guard,) = verify(recording, said, ['guard'], lambda name, share: None)
+        assert (guard.result, why in guard.reason) == ('skipped', True)
+
+
 @pytest.mark.parametrize('keep', [False, True])
 def test_a_bag_without_events_of_its_nodes_does_not_say_how_it_ended(altered, recorded, keep):
     messages = [one for one in recorded if keep or one.topic != '/diagnostics']

@@ -45,15 +45,15 @@ def _reason_to_skip(wired: Wired, settings, recording: Recording, lockstep: bool
     if settings is None:
         return 'the settings say nothing about it'
     topics = optional_topics(settings)
-    missing = [name for name in present(wired.inputs, topics) if name not in recording.series]
+    inputs = present(wired.inputs, topics)
+    if not lockstep and (WHEN_SILENT.keys() & inputs or wired in (wiring.PLANT, wiring.CURRENT)):
+        return 'free-running: which inputs it had at a tick is not on record'
+    missing = [name for name in inputs if name not in recording.series]
     if missing:
         return f'its input {" and ".join(missing)} is not recorded'
     outputs = present(wired.outputs, topics)
     if not any(name in recording.series for name in outputs):
         return f'none of {", ".join(outputs)} is recorded'
-    silent = [name for name in present(wired.inputs, topics) if name in WHEN_SILENT]
-    if not lockstep and (silent or wired in (wiring.PLANT, wiring.CURRENT)):
-        return 'free-running: which inputs it had at a tick is not on record'
     return ''
 
 
