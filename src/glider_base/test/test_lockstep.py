@@ -573,8 +573,14 @@ def test_two_of_one_name_are_told_apart_by_gid(listening, context):
     }
     (gid,) = infos - {item.owner.gid}
     shown = '.'.join(f'{byte:02x}' for byte in gid)
-    said = peers.stranger(first.node, item.topic, gid)
-    assert said == f'/glider/reference is published by /glider/guidance_node ({shown}) too'
+    said = peers.stranger(first.node, item, gid)
+    said_of = '/glider/reference is published by /glider/guidance_node'
+    assert said == f'{said_of} ({shown}) too'
+    first.node.destroy_publisher(first.publisher)
+    end = time.monotonic() + 10.0
+    while 'too' in (said := peers.stranger(second.node, item, gid)):
+        assert time.monotonic() < end
+    assert said == f'{said_of} which spoke while /glider/guidance_node did: start it again'
 
 
 def test_one_that_publishes_alone_is_told_whose_the_topic_is(listening):
@@ -582,7 +588,7 @@ def test_one_that_publishes_alone_is_told_whose_the_topic_is(listening):
     lone = add('my_guidance')
     assert not is_believed(lone, 9.0, 0.5)
     (info,) = lone.node.get_publishers_info_by_topic('reference')
-    said = peers.stranger(lone.node, item.topic, bytes(info.endpoint_gid))
+    said = peers.stranger(lone.node, item, bytes(info.endpoint_gid))
     assert said == f'/glider/reference is published by /glider/my_guidance and not by {GUIDANCE}'
 
 

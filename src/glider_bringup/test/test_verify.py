@@ -543,6 +543,14 @@ def test_recording_that_begins_late_cannot_be_compared(altered, recorded, tmp_pa
     assert all('from t = 10.0 s on' in one['reason'] for one in report['blocks'])
 
 
+def test_topics_that_were_remapped_are_named_where_nothing_is_compared(
+    altered, recorded, tmp_path
+):
+    folder = altered(recorded, rename=lambda name: name.replace('/glider/odom', '/hw/odom'))
+    notes = verified(folder, tmp_path, only=['guidance'])['notes']
+    assert any('/hw/odom (nav_msgs/msg/Odometry)' in note for note in notes)
+
+
 def test_half_a_topic_is_a_difference(altered, recorded, tmp_path):
     cut = [m for m in recorded if m.topic != '/glider/wrench' or m.log_ns < 60_000_000_000]
     first = results(altered(cut), tmp_path)['control']['first']

@@ -42,7 +42,7 @@ class Owner:
         self.name = ''  #: full name of its node, as far as it is known
         self.before = ''  #: name of the owner before it
         self.heard_s = -float('inf')  #: when it spoke last
-        self._strangers: set[bytes] = set()  #: have spoken while it did
+        self.strangers: set[bytes] = set()  #: have spoken while it did
         self._new: dict[bytes, float] = {}  #: have spoken since it did, and when at first
 
     def owns(self, gid: bytes, now_s: float) -> bool:
@@ -51,13 +51,13 @@ class Owner:
             return False
         self.heard_s = now_s
         if self._new:
-            self._strangers |= set(self._new)
+            self.strangers |= set(self._new)
             self._new = {}
         return True
 
     def is_strange(self, gid: bytes) -> bool:
         """Whether somebody is no owner, whatever else is known."""
-        return gid in self._strangers or bool(self._lockstep and self.gid)
+        return gid in self.strangers or bool(self._lockstep and self.gid)
 
     def claimed(
         self,

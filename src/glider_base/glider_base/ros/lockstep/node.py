@@ -351,7 +351,7 @@ class TickNode(Node):
 
     def refuse_stranger(self, item: Input, gid: bytes) -> None:
         """Tell that somebody else publishes an input."""
-        self.refuse(item, lambda: peers.stranger(self, item.topic, gid))
+        self.refuse(item, lambda: peers.stranger(self, item, gid))
 
     def tell_successor(self, item: Input, silent_s: float) -> None:
         """Tell that an input is somebody else's from now on."""

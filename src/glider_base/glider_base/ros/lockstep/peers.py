@@ -53,13 +53,15 @@ def rivals(node: Node, topics: Iterable[Topic]) -> list[str]:
     return [published_by(node, topic, name) for topic in own for name in others(node, topic)]
 
 
-def stranger(node: Node, topic: Topic, gid: bytes) -> str:
-    """Who publishes a topic that is not its own, in words; by gid too if that is not the name."""
-    names = publishers(node, topic)
+def stranger(node: Node, item: Input, gid: bytes) -> str:
+    """Who publishes an input that is not its own, in words; by gid too if that is not the name."""
+    topic, names = item.topic, publishers(node, item.topic)
     name = names.get(gid) or _NOBODY
     if list(names.values()).count(name) != 1:
         name += f' ({shown(gid)})'
     how = 'too' if {*names} - {gid} else f'and not by {topic.publisher}'
+    if how != 'too' and gid in item.owner.strangers:
+        how = f'which spoke while {item.owner.name or _NOBODY} did: start it again'
     return published_by(node, topic, name, how)
 
 

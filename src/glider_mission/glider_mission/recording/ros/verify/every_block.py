@@ -92,6 +92,10 @@ def report(bag: Bag, recording: Recording, given: NodeSettings, verdicts: list[V
     notes = [bag.cut] if bag.cut else []
     if not compared:
         notes.append('nothing could be compared')
+        if recording.ignored:
+            notes.append(
+                f'recorded under names that are none here: {", ".join(recording.ignored)}'
+            )
     if not lockstep:
         notes.append(
             'recorded free-running: a message that was lost, or a node that was started before '
