@@ -93,9 +93,7 @@ def report(bag: Bag, recording: Recording, given: NodeSettings, verdicts: list[V
     if not compared:
         notes.append('nothing could be compared')
         if recording.ignored:
-            notes.append(
-                f'recorded under names that are none here: {", ".join(recording.ignored)}'
-            )
+            notes.append(f'recorded under other names: {", ".join(recording.ignored)}')
     if not lockstep:
         notes.append(
             'recorded free-running: a message that was lost, or a node that was started before '
