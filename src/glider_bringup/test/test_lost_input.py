@@ -195,6 +195,8 @@ def test_what_sinks_while_the_guard_is_paused_has_not_jumped(flight):
     def sunk(by_m: float, s: float) -> bool:
         nonlocal depth_m
         flight.guard.pause()
+        cleared = flight.guard.on_clear(Trigger.Request(), Trigger.Response())
+        assert 'depth not known' in cleared.message
         depth_m += by_m
         vehicle.stamp_ns += int(s * 1e9)
         odom = (*LEVEL[:2], -depth_m, *LEVEL[3:], *CERTAIN)

@@ -31,6 +31,11 @@ class GuardNode(BlockNode):
         super().forget()
         self.stale_ticks, self.ascent = 0, INITIAL_ASCENT
 
+    def pause(self) -> None:
+        """Act no more, until `begin`; nobody knows how deep it is then."""
+        super().pause()
+        self.flags = None
+
     def on_clear(self, request, response):
         """Serve ``clear_guard``; while an input is stale nobody knows how deep the vehicle is."""
         depth = self.state.depths.depth
