@@ -67,7 +67,11 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
     return {
         'vehicle': uses.kind,
         'files': uses.files,
-        'fitted': dict(zip(uses.fields, map(float, numbers), strict=True)),
+        'fitted': {
+            name: float(number)
+            for name, number, done in zip(uses.fields, numbers, source.doings.T, strict=True)
+            if done[source.first_half].any()
+        },
         'fitted_parts': int(source.first_half.sum()),
         'predicted_parts': int(predicted.sum()),
         'recorded_wh': recorded / 3600.0,
@@ -92,8 +96,8 @@ def seaglider_uses(place: Path, progress: Progress) -> Uses:
     dives, left_out = read_each(files, progress, _pumpings)
     left_out |= strangers
     if not sum(len(dive.joules) for dive in dives):
-        why = '; '.join(said(left_out))
-        raise ConfigurationError(f'{place}: no pumping in its {len(dives)} files; {why}')
+        why = '; '.join([f'{place}: no pumping in its {len(dives)} files', *said(left_out)])
+        raise ConfigurationError(why)
     number = np.repeat(np.arange(len(dives)), [len(dive.joules) for dive in dives])
     moved = {field: sum(dive.moved[field] for dive in dives) for field in MASSES.values()}
     return Uses(
@@ -169,6 +173,8 @@ def _moved(found: dict[str, np.ndarray], name: str) -> np.ndarray:
 PART_S = 1800.0
 #: Of a longer time between two samples nothing is known (s): the files of it are missing.
 GAP_S = 600.0
+#: No Slocum draws more (W), or less than nothing: its counter was set back, or is wrong.
+MOST_W = 1000.0
 #: Less oil (cc) between two samples is noise of what measures it.
 LEAST_CC = 0.5
 #: A count of charge (Ah) in coulombs.
@@ -191,12 +197,13 @@ def slocum_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
     if len(sensors['m_depth'][0]) < 2:
         raise ConfigurationError(f'{place}: no value of m_depth in its {len(files)} files')
     steps_s = np.diff(time_s)
-    known = (steps_s > 0.0) & (steps_s <= GAP_S)
     volts = np.interp(time_s, volts_s, volts)
     joules = _COULOMBS * np.diff(charge) * 0.5 * (volts[1:] + volts[:-1])
-    depth = np.interp(time_s, *sensors['m_depth'])
+    depth = at_times(time_s, *sensors['m_depth'], GAP_S)
     sinks = vertical_rate(time_s, depth)[1:] > 0.0
     middle = 0.5 * (depth[1:] + depth[:-1])
+    known = (steps_s > 0.0) & (steps_s <= GAP_S) & np.isfinite(middle)
+    known &= (joules >= 0.0) & (joules <= MOST_W * steps_s)
     is_up = middle < SURFACE_DEPTH_M
     calls = np.nan_to_num(at_times(time_s, *sensors[CALL]))[1:] > 0.5
     pumped = np.diff(np.interp(time_s, oil_s, oil))

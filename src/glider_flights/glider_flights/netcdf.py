@@ -28,7 +28,7 @@ FILLS = 1e20
 #: What a glider, or its base station, can have been set to (m, rad, dbar, m/s): other values are
 #: damage, or stand for none where a file does not say which does.
 PLAUSIBLE = {
-    **dict.fromkeys(('depth_m', 'pressure'), (-50.0, 7000.0)),
+    **dict.fromkeys(('depth_m', 'depth', 'pressure'), (-50.0, 7000.0)),
     **{'pitch_rad': (-1.6, 1.6), 'roll_rad': (-3.2, 3.2), 'heading_rad': (-6.3, 6.3)},
     **{'declination_rad': (-3.2, 3.2), 'dac_north': (-5.0, 5.0), 'dac_east': (-5.0, 5.0)},
 }
@@ -132,6 +132,7 @@ def _in_ours(
         values = values.astype(float)
     except (TypeError, ValueError) as error:
         raise ConfigurationError(f'{name} has what is no number: {error}') from None
+    values[np.abs(values) >= FILLS] = math.nan
     if key.endswith('time'):
         return _seconds(name, values, unit)
     if scales and key in _USUAL and unit not in scales:
@@ -176,7 +177,6 @@ def _seconds(name: str, values: np.ndarray, units: str) -> np.ndarray:
     units = units or 'seconds since 1970-1-1'
     if _SINCE_1970.fullmatch(units):
         return values
-    values = np.where(np.abs(values) < FILLS, values, math.nan)
     try:
         decoded = xarray.coding.times.decode_cf_datetime(values, units)
     except (ImportError, ValueError):  # xarray tries cftime, which may not be there

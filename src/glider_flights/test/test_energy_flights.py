@@ -113,6 +113,20 @@ def test_what_lacks_is_named(tmp_path):
     fewer = write_dives(tmp_path / 'c', 2, gc_depth=('other', np.zeros(3)))
     assert 'gc_depth 3, ' in refused(fewer)
     assert 'needed: 2' in refused(write_dives(tmp_path / 'b', 1))
+    assert refused(write_dives(tmp_path / 'd', 2, log_VBD_CNV=((), 0.25))).endswith('2 files')
+
+
+@pytest.mark.parametrize(
+    ('name', 'fill'), [('gc_vbd_volts', 9.97e36), ('gc_vbd_i', 9.97e36), ('gc_depth', -999.0)]
+)
+def test_fills_of_a_seaglider_are_no_pumping(tmp_path, name, fill):
+    folder = write_dives(tmp_path / 'a', 4)
+    alone = energy(folder)['fitted']
+    with xarray.open_dataset(folder / 'p1710001.nc', engine='scipy') as file:
+        filled = file.load()
+    filled[name][3] = fill
+    filled.to_netcdf(folder / 'p1710001.nc', engine='scipy')
+    assert energy(folder)['fitted'] == pytest.approx(alone, rel=1e-6)
 
 
 # ---------------------------------------------------------------------- Slocum
@@ -158,6 +172,42 @@ def test_half_of_a_slocum_flight_tells_its_hotel_and_its_pump(tmp_path, write_db
     pumped = fitted['pump_out'] + 80.0 * fitted['pump_out_per_m']
     assert pumped == pytest.approx(OUT + 80.0 * PER_M, rel=0.1)
     assert told['error_percent'] == pytest.approx(0.0, abs=1.0)
+
+
+def set_back(sensors):
+    sensors['m_coulomb_amphr_total'][1][3000:] -= 100.0
+
+
+def off_for_a_moment(sensors):
+    sensors['m_coulomb_amphr_total'][1][3000] = 0.0
+
+
+def leaps(sensors):
+    sensors['m_coulomb_amphr_total'][1][3000:] += 50.0
+
+
+def without_depth(sensors):
+    sensors['m_depth'][1][1000:3000] = np.nan
+
+
+@pytest.mark.parametrize('harm', [set_back, off_for_a_moment, leaps, without_depth])
+def test_what_no_slocum_draws_and_what_no_depth_is_of_is_left_out(tmp_path, write_dbd, harm):
+    pytest.importorskip('dbdreader')
+    sensors = slocum(40)
+    harm(sensors)
+    write_dbd(tmp_path / '00010000.DBD', sensors, cached=False)
+    told = energy(tmp_path)
+    fitted = [told['fitted'][name] for name in ('hotel_dive', 'hotel_climb', 'hotel_surface')]
+    assert fitted == pytest.approx([DIVE_W, CLIMB_W, SURFACE_W], rel=0.01)
+    assert told['error_percent'] == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_slocum_of_which_no_call_is_recorded_has_no_power_of_calls(tmp_path, write_dbd):
+    pytest.importorskip('dbdreader')
+    sensors = slocum(20)
+    del sensors['m_iridium_on']
+    write_dbd(tmp_path / '00010000.DBD', sensors, cached=False)
+    assert 'call_power' not in energy(tmp_path)['fitted']
 
 
 def test_kinds_do_not_mix(tmp_path, write_dbd):
