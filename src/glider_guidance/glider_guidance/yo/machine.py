@@ -159,6 +159,7 @@ class ProfileState(NamedTuple):
     turn_depth: float = math.inf
     depth: float = math.inf  #: of a dive, when that was planned (m)
     begun: int = 0  #: dives before those of the path that began at the end of the one before
+    is_cut: bool = False  #: a hold has ended this dive on its way down: it counts as none
 
 
 #: Of a mission that does not end with its path.
@@ -290,16 +291,16 @@ def profile_step(
             turn_depth=planned,
             depth=params.depth,
         )
+    is_cut = params.holds if is_descending(state.stage) else state.is_cut
     is_at_once = state.stage == INFLECTING_UP and stage == WAITING_ON_SURFACE
-    climbed = (state.stage == GLIDING_UP or is_at_once) and not state.aborted
-    # the climb of a dive that a hold cuts short is to count none
-    is_cut = params.holds and is_descending(state.stage) and stage == INFLECTING_UP
+    climbed = state.stage == GLIDING_UP or is_at_once
     return replace(
         state,
         stage=stage,
         ticks=0,
         near_ticks=0,
-        dives=state.dives + climbed - is_cut,
+        dives=state.dives + (climbed and not is_cut and not state.aborted),
+        is_cut=is_cut,
         turn_depth=planned,
         depth=params.depth,
     )
