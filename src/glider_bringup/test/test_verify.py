@@ -34,7 +34,7 @@ from glider_mission.recording.ros.node_settings import read_settings
 from glider_mission.recording.ros.recorded_run import Recording, Series
 from glider_mission.recording.ros.verify.check import IDENTICAL
 from glider_mission.recording.ros.verify.every_block import report, verify
-from glider_mission.recording.ros.verify.free_running import free_running
+from glider_mission.recording.ros.verify.free_running import _by_stamp, free_running
 from glider_mission.recording.ros.verify.lockstep import place_ticks
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
@@ -381,6 +381,16 @@ def test_an_input_that_shows_only_some_steps_later_is_found_by_trying(short_run,
     recording.events = []
     found = free_running(again, recording, 1.0, lambda share: None)
     assert (found.ticks, found.compared['demand'], found.differing) == (100, 100, {})
+
+
+def test_a_free_running_bag_may_end_in_the_middle_of_a_step():
+    """With a demand whose adaptation came too late; a topic may not go on alone."""
+    series = Series(TOPICS['demand'].codec)
+    series.stamps_ns = TICK_NS * np.arange(200)
+    series._count = 200
+    for steps, left in ((199, 0), (150, 50)):
+        track, over = _by_stamp(series, series.stamps_ns[:steps])
+        assert (track.gap, len(over)) == (steps, left)
 
 
 def test_what_a_vehicle_need_not_say_is_not_missed_where_it_flies_freely(short_run, tmp_path):

@@ -14,7 +14,7 @@ from glider_base.ros.lockstep.step_node import Passing
 from glider_base.signals import TICK_S
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
-from glider_mission.recording.ros.verify.check import Check, Track, Verdict
+from glider_mission.recording.ros.verify.check import TICKS_OF_THE_END, Check, Track, Verdict
 
 #: A step has the newest message of an input, or one that is so many older.
 _OLDER = range(4)
@@ -30,7 +30,10 @@ _MISSED_S = {name: 1.5 * TICK_S for name in ('odom', 'joint_states')}
 
 
 def _by_stamp(series: Series, stamps_ns: np.ndarray) -> tuple[Track, list[int]]:
-    """Track of an output whose steps have these stamps in this order, and what is left over."""
+    """Track of an output whose steps have these stamps in this order, and what is left over.
+
+    A recorder may have left in the middle of a step, before it had the output that marks it.
+    """
     index, left, j = np.full(len(stamps_ns), -1), [], 0
     for i, stamp_ns in enumerate(stamps_ns):
         while j < len(series) and series.stamps_ns[j] < stamp_ns:
@@ -39,7 +42,8 @@ def _by_stamp(series: Series, stamps_ns: np.ndarray) -> tuple[Track, list[int]]:
         if j < len(series) and series.stamps_ns[j] == stamp_ns:
             index[i] = j
             j += 1
-    return Track(series, index), [*left, *range(j, len(series))]
+    after = range(j, len(series))
+    return Track(series, index), [*left, *(after if len(after) > TICKS_OF_THE_END else ())]
 
 
 def free_running(
