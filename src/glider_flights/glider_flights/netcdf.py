@@ -21,15 +21,23 @@ _UNITS = {
     **{'': 1.0, 'rad': 1.0, 'deg': math.radians(1.0), 'cc': 1e-6, 'g': 1e-3},
     **{'cm': 1e-2, 'cm aft': -1e-2, 'inch': 0.0254, 'cm/s up': -1e-2},
 }
+#: Units of which the values are multiplied by something else than `variables.yaml` says; which
+#: way they count it says.
+SCALES = {
+    **dict.fromkeys(('rad', 'radian', 'radians', 'm', 'm/s', 'm s-1', 'kg'), 1.0),
+    **dict.fromkeys(('cm', 'cm/s', 'cm s-1'), 1e-2),
+    **{'bar': 10.0, 'kPa': 0.1, 'hPa': 0.01, 'mbar': 0.01, 'Pa': 1e-4},
+}
 #: What is text, or may be.
 _TEXTS = ('model', 'vehicle', 'fix_quality')
 #: So large are values that are missing, where a file does not say which they are.
 FILLS = 1e20
-#: What a glider, or its base station, can have been set to (m, rad, dbar, m/s): other values are
-#: damage, or stand for none where a file does not say which does.
+#: What a glider, or its base station, can have been set to (m, rad, dbar, m/s, deg C): others are
+#: damage, in kelvin, or stand for none where a file does not say which does.
 PLAUSIBLE = {
     **dict.fromkeys(('depth_m', 'depth', 'pressure'), (-50.0, 7000.0)),
     **{'pitch_rad': (-1.6, 1.6), 'roll_rad': (-3.2, 3.2), 'heading_rad': (-6.3, 6.3)},
+    **{'temperature_degc': (-5.0, 45.0), 'salinity': (0.0, 50.0)},
     **{'declination_rad': (-3.2, 3.2), 'dac_north': (-5.0, 5.0), 'dac_east': (-5.0, 5.0)},
 }
 #: Units of some, as an error names them, and as files spell the usual one.
@@ -88,18 +96,12 @@ def _datasets(path: Path) -> list:
     return list(xarray.open_groups(path, engine='h5netcdf', decode_times=False).values())
 
 
-def read(
-    path: Path,
-    wanted: Names,
-    spelt: Callable[[str], str] = str,
-    scales: dict[str, float] | None = None,
-) -> dict[str, np.ndarray]:
+def read(path: Path, wanted: Names, spelt: Callable[[str], str] = str) -> dict[str, np.ndarray]:
     """Variables of a file as flat arrays in our units, by our names.
 
     Times, in s since 1970, are those of which ours ends with ``time``. ``spelt`` makes a wanted
-    name of one in the file, ``scales`` says what values in some units are multiplied by instead;
-    with it a depth, pressure or angle in a unit that is not known is refused.
-    Raises ConfigurationError.
+    name of one in the file. Raises ConfigurationError, also for a depth, pressure or angle in a
+    unit that is not known.
     """
     found: dict[str, np.ndarray] = {}
     with opened(path) as groups:
@@ -113,19 +115,12 @@ def read(
                 values = np.atleast_1d(variable.values).ravel()
                 if key not in _TEXTS:
                     attrs = variable.attrs
-                    values = _in_ours(f'{path}: {name}', key, values, attrs, names[name], scales)
+                    values = _in_ours(f'{path}: {name}', key, values, attrs, names[name])
                 found[key] = values
     return found
 
 
-def _in_ours(
-    name: str,
-    key: str,
-    values: np.ndarray,
-    attrs: dict,
-    scale: float,
-    scales: dict[str, float] | None,
-) -> np.ndarray:
+def _in_ours(name: str, key: str, values: np.ndarray, attrs: dict, scale: float) -> np.ndarray:
     """Values of a variable in our units, by its attributes; NaN for what cannot be."""
     unit = str(attrs.get('units', ''))
     try:
@@ -135,13 +130,13 @@ def _in_ours(
     values[np.abs(values) >= FILLS] = math.nan
     if key.endswith('time'):
         return _seconds(name, values, unit)
-    if scales and key in _USUAL and unit not in scales:
+    if key in _USUAL and unit not in SCALES:
         usual, spelt = _USUAL[key]
         if not re.fullmatch(spelt, unit.strip(), re.IGNORECASE):
             raise ConfigurationError(f'{name} is in {unit!r} (allowed: {usual})')
     if key == 'depth_m' and attrs.get('positive') == 'up':
         scale = -scale
-    values = values * math.copysign((scales or {}).get(unit, scale), scale)
+    values = values * math.copysign(SCALES.get(unit, scale), scale)
     lowest, highest = PLAUSIBLE.get(key, (-math.inf, math.inf))
     values[(values < lowest) | (values > highest)] = math.nan
     return values

@@ -46,14 +46,6 @@ from glider_model.ocean.columns import is_height
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import Vehicle
 
-#: Units of which the values are multiplied by something else than `variables.yaml` says; which
-#: way they count it says.
-SCALES = {
-    **dict.fromkeys(('rad', 'radian', 'radians', 'm', 'm/s', 'm s-1', 'kg'), 1.0),
-    **dict.fromkeys(('cm', 'cm/s', 'cm s-1'), 1e-2),
-    **{'bar': 10.0, 'kPa': 0.1, 'hPa': 0.01, 'mbar': 0.01, 'Pa': 1e-4},
-}
-
 
 def og1_files(place: Path) -> list[Path]:
     """NetCDF files, if one of them has a single time for all and fixes or pitch, as OG1 has.
@@ -99,7 +91,7 @@ def _on_board(known: dict[str, np.ndarray], samples: Samples) -> OnBoard:
 
 def _read(path: Path) -> LogFile:
     wanted = names_of('og1')
-    known = read(path, wanted, str.upper, SCALES)
+    known = read(path, wanted, str.upper)
     model, vehicle = (
         str(values[0]) if len(values) else ''
         for values in (known.pop(name, ()) for name in ('model', 'vehicle'))

@@ -297,6 +297,9 @@ def put_together(kind: str, files: list[LogFile], notes: list[str]) -> Flight:
         segments += found
         unused += [one for one in why if one not in unused]
     names = {name for file in files for name in file.body}
+    turned = [file.name for file in files if (np.diff(file.time_s) < 0.0).any()]
+    if turned:
+        notes = [*notes, f'time goes back in {", ".join(turned)}: its samples are sorted by it']
     body = {
         name: usual([file.body[name] for file in files if name in file.body]) for name in names
     }

@@ -57,7 +57,10 @@ WRITTEN = re.compile(r'(.+)-(\d+)-(\d+)-(\d+)-(\d+)')
 #: Times in one file are no further apart than this (s).
 LONGEST_FILE_S = 20 * 86_400.0
 #: Our names of what is ignored whatever it says.
-OURS = {'m_depth': 'depth_m', 'm_pitch': 'pitch_rad', 'm_heading': 'heading_rad'}
+OURS = {
+    **{'m_depth': 'depth_m', 'm_pitch': 'pitch_rad', 'm_heading': 'heading_rad'},
+    'sci_water_temp': 'temperature_degc',
+}
 #: Without these nothing can be reckoned.
 NEEDED = ('m_depth', 'm_pitch', 'm_heading', 'm_gps_lat', 'm_gps_lon')
 WANTED = (

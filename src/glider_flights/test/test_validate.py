@@ -139,6 +139,45 @@ def report(*words: str) -> dict:
     return json.loads(done.stdout)
 
 
+@pytest.mark.parametrize(
+    ('name', 'change', 'unit', 'is_known'),
+    [
+        ('depth', lambda dive: 100.0 * dive['depth'], 'cm', True),
+        ('eng_pitchAng', lambda dive: dive['pitch'], 'radians', True),
+        (
+            'salinity',
+            lambda dive: np.where(np.arange(len(dive['time'])) % 9, 35.0, -999.0),
+            '',
+            True,
+        ),
+        ('temperature', lambda dive: temperature(dive['depth']) + 273.15, 'K', False),
+    ],
+)
+def test_units_and_fills_of_a_seaglider_make_no_other_numbers(
+    dive, tmp_path, name, change, unit, is_known
+):
+    changed = {name: ('sg_data_point', change(dive), {'units': unit})}
+    got = report(write_flight(tmp_path / 'a', [dive], **changed), '--vehicle', 'seaglider')
+    want = report(write_flight(tmp_path / 'b', [dive]), '--vehicle', 'seaglider')
+    if is_known:
+        assert got['fitted'] == pytest.approx(want['fitted'], rel=1e-3)
+    assert any('1025 kg/m3 is taken' in note for note in got['notes']) != is_known
+
+
+def test_time_that_goes_back_is_told_and_a_unit_that_is_not_known_refused(dive, tmp_path):
+    (tmp_path / 'a').mkdir()
+    write_dive(
+        tmp_path / 'a/p1230001.nc',
+        {name: row[::-1] for name, row in dive.items()},
+        log_gps_time=('gps_info', START_S + np.array([-300.0, -60.0, dive['time'][-1]])),
+    )
+    got = report(str(tmp_path / 'a'), '--vehicle', 'seaglider')
+    assert got['notes'][0] == 'time goes back in p1230001.nc: its samples are sorted by it'
+    feet = {'depth': ('sg_data_point', 3.28 * dive['depth'], {'units': 'feet'})}
+    folder = write_flight(tmp_path / 'b', [dive], **feet)
+    assert "depth is in 'feet'" in told(folder, '--vehicle', 'seaglider')
+
+
 def told(*words: str) -> str:
     """What the command says when it refuses."""
     with pytest.raises(ConfigurationError) as error:

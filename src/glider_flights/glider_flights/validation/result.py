@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError
+from glider_base.signals import SEA_WATER_DENSITY
 from glider_flights.energy import predict
 from glider_flights.folders import Progress
 from glider_flights.reading import files_by_kind, read_uses, read_whole
@@ -118,7 +119,7 @@ def validate(
         },
         'notes': flight.notes
         + ['no speed by an ADCP at the time of the flight'] * foreign
-        + _other_kind(flight, vehicle)
+        + _taken(flight, vehicle, found)
         + ([why] if why else [])
         + at_bounds(names, begun, learnt),
     }
@@ -129,12 +130,14 @@ def validate(
     return Validation(pairs, model, adcp, report)
 
 
-def _other_kind(flight: Flight, vehicle: str) -> list[str]:
-    """A note, if the vehicle that is named stands for the other kind of flight."""
+def _taken(flight: Flight, vehicle: str, found: list[Track]) -> list[str]:
+    """Notes of a vehicle that stands for the other kind of flight, and of water that is taken."""
     usual = VEHICLES.get(flight.kind, vehicle)
-    if usual == vehicle or vehicle not in VEHICLES.values():
-        return []
-    return [f'a {flight.kind} flew this: its vehicle is {usual}, not {vehicle}']
+    other_kind = usual != vehicle and vehicle in VEHICLES.values()
+    no_water = any(np.isnan(track.density_kgpm3).all() for track in found)
+    return [f'a {flight.kind} flew this: its vehicle is {usual}, not {vehicle}'] * other_kind + [
+        f'no temperature or no salinity: water of {SEA_WATER_DENSITY:g} kg/m3 is taken'
+    ] * no_water
 
 
 def _heard(found: list[Track], adcp: Adcp) -> bool:
