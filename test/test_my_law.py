@@ -79,7 +79,11 @@ BROKEN = {
         'bare': ('broken:Bare', 'ValueError: its field gain has no usable default'),
         'idle': ('broken:Law', 'TypeError: it has no params and no initial_state'),
     },
-    'glider.commands': {'dry': ('no_such_module:app', 'ModuleNotFoundError: No module named')},
+    'glider.commands': {
+        'dry': ('no_such_module:app', 'ModuleNotFoundError: No module named'),
+        'five': ('broken:NUMBER', 'TypeError: it is no typer.Typer'),
+        'score': ('broken:NUMBER', 'ValueError: its name is taken'),
+    },
     'glider.guidance_methods': {'los': ('broken:Law', 'ValueError: its name is taken')},
     'glider.navigation_methods': {'blind': ('broken:Blind', 'ValueError: it reads or tells gps')},
     'glider.currents': {'whirl': ('broken:Whirl', "TypeError: it needs kind: Literal['whirl']")},

@@ -96,11 +96,10 @@ class Commands(typer.core.TyperGroup):
     def get_command(self, ctx: typer.Context, cmd_name: str) -> typer.core.TyperCommand | None:
         """What a name stands for; None: nothing that can be used."""
         module, point = _modules().get(cmd_name), offered(COMMANDS).get(cmd_name)
+        added = used(point, partial(_added, cmd_name)) if point else None
         if module:
             return _command(cmd_name, import_module(module).app)
-        if point:
-            return used(point, partial(_command, cmd_name))
-        return super().get_command(ctx, cmd_name)
+        return added or super().get_command(ctx, cmd_name)
 
 
 def _modules() -> dict[str, str]:
@@ -113,6 +112,15 @@ def _command(name: str, found: typer.Typer) -> typer.core.TyperCommand:
     """Command of an application, or all of them under its name."""
     group = typer.main.get_group(found)
     return group.commands.get(name, group)
+
+
+def _added(name: str, found: typer.Typer) -> typer.core.TyperCommand:
+    """Command of another package."""
+    if name in _modules() or name in OF_THE_SCRIPT:
+        raise ValueError('its name is taken')
+    if not isinstance(found, typer.Typer):
+        raise TypeError('it is no typer.Typer')
+    return _command(name, found)
 
 
 def _refuse(called: typer.Context) -> None:
