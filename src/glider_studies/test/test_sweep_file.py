@@ -15,6 +15,7 @@ from glider_base.settings import find_field, unit_of
 from glider_bringup import cli
 from glider_mission.changes import overlap
 from glider_mission.scenario import Scenario, load_scenario
+from glider_studies.sweep.netcdf import make_dataset
 from glider_studies.sweep.plan import (
     GridDimension,
     LogUniformDimension,
@@ -86,6 +87,13 @@ def test_last_dimension_runs_fastest_and_every_combination_is_one_cell(tmp_path)
         for speed in (0.5, 1.0)
     ]
     assert plan.coordinates(2) == {'who': 'b', 'speed': 0.5}
+
+
+def test_seeds_that_no_float_holds_keep_their_digits_in_the_result(tmp_path):
+    seeds = [2**53, 2**53 + 1]
+    dimensions = {'seed': {'kind': 'values', 'field': 'seed', 'values': seeds}}
+    found = make_dataset(plan_of(tmp_path, dimensions=dimensions), []).seed.values
+    assert list(map(int, found)) == seeds
 
 
 tenths = st.integers(-500, 500).map(lambda n: Decimal(n) / 10)

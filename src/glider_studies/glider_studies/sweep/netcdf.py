@@ -81,10 +81,10 @@ def _coordinate(plan: Plan, number: int) -> tuple[str, np.ndarray, dict[str, Any
         attributes[GLIDE_MPS] = [horizontal_speed(one) for one in plan.along(number)]
     if all(isinstance(value, bool) for value in axis.values):
         values = np.array(axis.values, dtype=np.int8)
-    elif all(isinstance(value, int | float) for value in axis.values):
+    elif all(isinstance(value, int | float) and float(value) == value for value in axis.values):
         values = np.array(axis.values, dtype=np.float64)
         attributes['units'] = _SPELLING.get(unit, unit)
-    else:
+    else:  # or seeds that a float would round
         values = np.array([str(value) for value in axis.values], dtype=object)
     return axis.name, values, attributes
 
