@@ -13,7 +13,7 @@ import command_line
 from glider_base.signals import TICK_S
 from glider_bringup.scoring.card import STATUSES, fly_scored
 from glider_bringup.scoring.score import Scorer
-from glider_bringup.showing.scorecard import event_texts
+from glider_bringup.showing.scorecard import arrival_text, event_texts
 from glider_guard.rows import CRUSHING, LEAK, NOT_RISING, STUCK_ROLL
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.rules import Rules
@@ -372,3 +372,11 @@ def test_compare_says_it_of_each_run(ended):
     process = glider('compare', folder, other)
     assert process.returncode == 0, process.stderr
     assert f'{status.capitalize()} before its end: 1 of 2 runs' in process.stdout
+
+
+@pytest.mark.parametrize(('status', 'goes_on'), [('unfinished', True), ('surfaced', False)])
+def test_who_is_up_for_good_has_no_pace(status, goes_on):
+    arrival = {'place_latlon_deg': None, 't_s': None, 'left_m': 500.0, 'eta_s': 3700.0}
+    text = arrival_text({'status': status, 'sim_time_s': 100.0, 'arrival': arrival})
+    assert text.startswith('did not arrive in')
+    assert ('at its pace' in text) == goes_on

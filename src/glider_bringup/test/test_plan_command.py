@@ -19,10 +19,12 @@ from glider_bringup.commands import plan as planning
 from glider_bringup.commands.plan import plan
 from glider_bringup.engines.flight import fly
 from glider_bringup.engines.recorded import fly_recorded
+from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.showing.findings import findings
 from glider_bringup.showing.flown_run import read_run
 from glider_mission.blocks import COLUMNS
+from glider_mission.planned import unballasted
 from glider_mission.routing import pilot as piloting
 from glider_mission.routing.plan import plan as planned
 from glider_mission.run_folder import make_run_folder
@@ -172,6 +174,18 @@ def test_a_flight_whose_glides_are_not_steered_says_so_before_and_after(tmp_path
     assert problem.startswith('Dives and climbs are not steered by roll')
     assert not any('could be held' in text for _, text in told)
     assert not any(load_scenario(name).unsteered for name in scenario_names())
+
+
+@pytest.mark.parametrize(
+    ('density', 'why'), [(1005.0, 'sinks whatever'), (1025.0, ''), (1045.0, 'floats whatever')]
+)
+def test_a_vehicle_that_is_not_ballasted_for_its_water_is_named(density, why):
+    water = {'profile': [[0.0, density], [300.0, density + 0.1]]}
+    scenario = load_scenario('slocum_shelf', {'dives': 0, 'duration_s': 1500.0, 'water': water})
+    assert why in ''.join(unballasted(scenario)) and bool(why) == bool(unballasted(scenario))
+    depth = fly_scored(scenario)[1]['depth_m']['max']
+    assert {'sinks whatever': depth > 250.0, '': 190.0 < depth < 210.0}.get(why, depth < 5.0)
+    assert not any(unballasted(load_scenario(name)) for name in scenario_names())
 
 
 def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(tmp_path):

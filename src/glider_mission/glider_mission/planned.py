@@ -1,13 +1,14 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""How long a mission takes, and how fast, as far as that is known before it is flown."""
+"""What is known of a mission before it is flown: how long, how fast, and whether it can dive."""
 
 import math
 
-from glider_base.signals import TICK_S
+from glider_base.signals import SEA_WATER_DENSITY, TICK_S
 from glider_guidance.guidance import path_time_s
 from glider_guidance.yo.machine import mission_time_s
 from glider_mission.scenario import Scenario
+from glider_model.ocean.density import immersed
 from glider_model.onboard.glide_polar import make_polar, steady_horizontal_speed
 from glider_model.vehicle.file import Vehicle, load_vehicle
 
@@ -30,3 +31,21 @@ def horizontal_speed(scenario: Scenario, vehicle: Vehicle | None = None) -> floa
     polar = make_polar((vehicle or load_vehicle(scenario.vehicle)).params())
     pitch = -math.radians(scenario.profile.pitch_deg)
     return steady_horizontal_speed(pitch, scenario.profile.net_heaviness_kg, polar)
+
+
+def unballasted(scenario: Scenario) -> list[str]:
+    """Whether the pump of its vehicle is too small for the water where it starts, in words."""
+    plant = scenario.plant_settings().params()
+    vehicle = plant.vehicle
+    if vehicle.volume == 0.0:  # neutral there
+        return []
+    most = vehicle.m_b_max
+    out, full = (immersed(0.0, oil, vehicle, plant.density) for oil in (-most, most))
+    if out.net <= 0.0 <= full.net:
+        return []
+    off_kg, how = (out.net, 'sinks') if out.net > 0.0 else (-full.net, 'floats')
+    density = out.ratio * SEA_WATER_DENSITY
+    return [
+        f'in water of {density:.1f} kg/m^3, as at its start, it {how} whatever its pump does: '
+        f'by {off_kg:.2g} kg; ballast it in its vehicle file (volume, rigid_body)'
+    ]

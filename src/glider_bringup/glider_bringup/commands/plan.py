@@ -77,10 +77,11 @@ def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
 
 def _notes(made: Any, scenario: Scenario) -> list[str]:
     """What a plan does not count, and what of its dives the bottom does not let be."""
+    from glider_mission.planned import unballasted
     from glider_mission.routing.plan import bottom_under
 
     orders, profile = len(scenario.orders), scenario.profile
-    notes = scenario.unsteered
+    notes = scenario.unsteered + unballasted(scenario)
     notes += [f'{count(orders, "order")} of the mission not counted'] if orders else []
     bottom_m = bottom_under(made.route.corners, scenario.bottom())
     if bottom_m <= 0.0:

@@ -207,7 +207,7 @@ def _fly(
     from glider_bringup.door.run import fly_by
     from glider_bringup.scoring.card import write_score
     from glider_bringup.scoring.traces import make_tracer
-    from glider_mission.planned import planned_ticks
+    from glider_mission.planned import planned_ticks, unballasted
     from glider_mission.run_folder import run_folder
 
     if bag or engine == 'nodes':  # else nothing of ROS is needed; with it, it is there
@@ -215,7 +215,7 @@ def _fly(
     tracer = make_tracer(scenario) if report else None
     with run_folder(scenario, out) as folder:
         messages.print(f'{scenario.name}: {scenario.described}')
-        for note in scenario.unsteered:
+        for note in scenario.unsteered + unballasted(scenario):
             tell(note)
         with progress(planned_ticks(scenario)) as (flying, reading):
             if begin_view:

@@ -13,6 +13,7 @@ from rich.table import Table
 
 from glider_bringup.console import messages, output
 from glider_bringup.scoring.card import STATUSES, STOPPED
+from glider_bringup.scoring.outcome import LOST, SURFACED
 from glider_bringup.scoring.scores import EVENTS_KEPT, SCORES, Score, reckoned, scores_in
 from glider_bringup.showing.words import span, way
 from glider_mission.changes import fields_text
@@ -124,8 +125,9 @@ def arrival_text(card: dict) -> str:
         text = f'came up {missed} from its last point after {span(part["t_s"])}{where}'
         return text + ('' if part['arrived'] else ', too far off to have arrived')
     text = f'did not arrive in {span(card["sim_time_s"])}: {way(part["left_m"])} left{where}'
-    more_s = None if part['eta_s'] is None else part['eta_s'] - card['sim_time_s']
-    return text + ('' if more_s is None else f'; at its pace {span(more_s)} more')
+    if part['eta_s'] is None or card['status'] in (SURFACED, LOST):  # it goes no further
+        return text
+    return text + f'; at its pace {span(part["eta_s"] - card["sim_time_s"])} more'
 
 
 def _energy_rows(card: dict) -> list[tuple[str, str]]:
