@@ -35,7 +35,7 @@ def passed(*samples, params=PARAMS):
 
 @quick
 @given(
-    position=st.tuples(*3 * [st.floats(-1e6, 1e6)]),
+    position=st.tuples(*2 * [st.floats(-1e6, 1e6)], st.floats(-12e3, 12e3)),
     angles=st.tuples(*3 * [st.floats(-3.0, 3.0)]),
     velocity=st.tuples(*3 * [st.floats(-3.0, 3.0)]),
     omega=st.floats(-5.0, 5.0),
@@ -56,6 +56,15 @@ def test_a_wild_number_anywhere_is_refused_and_the_last_good_sample_serves(place
     assert state.odometry == GOOD
     assert state.refused == 1
     assert passed(GOOD, Odometry(*numbers), GOOD).age_s == 0.0
+
+
+@pytest.mark.parametrize(('place', 'wild'), [(0, -2.1e7), (1, 1e12), (2, 12_500.0)])
+def test_a_place_that_is_not_on_earth_never_counts(place, wild):
+    numbers = list(GOOD)
+    numbers[place] = wild
+    state = passed(GOOD, *(200 * [Odometry(*numbers)]))
+    assert state.odometry == GOOD
+    assert state.refused == 200
 
 
 @pytest.mark.parametrize('factor', [0.0, 0.5, 0.98, 1.02, 2.0])

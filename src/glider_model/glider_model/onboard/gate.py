@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is taken for measured: a wild sample of odometry is refused, the last good one serves.
 
-A sample is refused if a number is not finite, the quaternion is none, a rate or the speed is
+A sample is refused if a number is not finite, the quaternion is none, place, rate or speed are
 beyond any glider's, or if it lies so far from where the last good one leads that no glider went
 there. After ``hold_s`` of refusals a sample that is good in itself counts again, for then the
 world has jumped (a fix, a new source); without one the measurement is lost.
@@ -18,6 +18,8 @@ from glider_base.signals import Odometry
 
 #: Actuators that say they are farther out than this many ranges are not plausible (-).
 JOINT_RANGES = 1.5
+#: No place is farther than half round the Earth, and no sea is deeper (m).
+FARTHEST_M, DEEPEST_M = 2e7, 12_000.0
 #: Deviation of a quaternion's squared norm from 1: from here it is scaled, from there refused (-).
 NORM_SCALED, NORM_REFUSED = 1e-9, 0.02
 
@@ -92,13 +94,13 @@ def is_slow(x, params):
 
 @kernel
 def is_plausible(odometry, params):
-    """Whether a sample is good in itself: finite, an attitude, no faster than any glider."""
+    """Whether a sample is good in itself: on Earth, an attitude, no faster than any glider."""
     x = odometry
     # a comparison with NaN is false: each is put such that NaN is refused
     return (
-        math.isfinite(x.p_n)
-        and math.isfinite(x.p_e)
-        and math.isfinite(x.p_d)
+        abs(x.p_n) <= FARTHEST_M
+        and abs(x.p_e) <= FARTHEST_M
+        and abs(x.p_d) <= DEEPEST_M
         and abs(norm2(x) - 1.0) < NORM_REFUSED
         and x.u * x.u + x.v * x.v + x.w * x.w <= params.speed_max2
         and is_slow(x, params)
