@@ -244,6 +244,8 @@ flown = []
 signal.signal(signal.SIGTERM, end_as_interrupt)
 for shot in range(10):
     number = (signal.SIGINT, signal.SIGTERM)[shot % 2]
+    # a shell has SIGINT ignored in the background
+    signal.signal(signal.SIGINT, (signal.default_int_handler, signal.SIG_IGN)[shot % 2])
     signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(number))
     began = []
     if shot:  # the first one compiles

@@ -10,11 +10,7 @@ from contextlib import contextmanager
 
 def end_as_interrupt(number: int, frame) -> None:
     """Handler of SIGTERM, which batch systems send: it ends a command as Ctrl-C does."""
-    handler = signal.getsignal(signal.SIGINT)
-    if callable(handler) and handler is not signal.default_int_handler:
-        handler(number, frame)
-    else:
-        raise KeyboardInterrupt(signal.Signals(number).name)
+    raise KeyboardInterrupt(signal.Signals(number).name)
 
 
 def stopped_by(interrupt: KeyboardInterrupt) -> str:
@@ -30,19 +26,20 @@ def interrupts_noted() -> Iterator[list[str]]:
     the tuples that it was about to make, and the process ends with a segmentation fault.
     """
     noted: list[str] = []
-    handler = signal.getsignal(signal.SIGINT)
-    is_main = threading.current_thread() is threading.main_thread()
-    if not is_main or not callable(handler):  # another thread hears it, or nobody
-        yield noted
-        return
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    if threading.current_thread() is not threading.main_thread():  # that one hears them
+        handlers = {}
+    handlers = {number: one for number, one in handlers.items() if callable(one)}
 
     def note(number, frame) -> None:
         if noted:
-            handler(number, frame)
+            handlers[number](number, frame)
         noted.append(signal.Signals(number).name)
 
-    signal.signal(signal.SIGINT, note)
+    for number in handlers:
+        signal.signal(number, note)
     try:
         yield noted
     finally:
-        signal.signal(signal.SIGINT, handler)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
