@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A flight in the water of an ocean model: the same as in a cast of it, where it is all alike."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray
@@ -66,6 +68,8 @@ def test_it_is_flown_as_a_cast_of_the_same_water_and_says_which_file(tmp_path):
     assert len(told['fingerprint']) == 16
     with pytest.raises(ConfigurationError, match=r'water.grid.file .*not the one that was flown'):
         fly({'grid': {'file': file, 'fingerprint': '0' * 16}})
+    Path(file).unlink()
+    assert model.report(tmp_path / 'report.html').exists()
 
 
 def test_in_the_warmer_water_of_the_north_it_sinks_faster(tmp_path):

@@ -19,7 +19,6 @@ from glider_bringup.commands import plan as planning
 from glider_bringup.commands.plan import plan
 from glider_bringup.engines.flight import fly
 from glider_bringup.engines.recorded import fly_recorded
-from glider_bringup.scoring.card import fly_scored
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_bringup.showing.findings import findings
 from glider_bringup.showing.flown_run import read_run
@@ -179,11 +178,14 @@ def test_a_flight_whose_glides_are_not_steered_says_so_before_and_after(tmp_path
 @pytest.mark.parametrize(
     ('density', 'why'), [(1005.0, 'sinks whatever'), (1025.0, ''), (1045.0, 'floats whatever')]
 )
-def test_a_vehicle_that_is_not_ballasted_for_its_water_is_named(density, why):
+def test_a_vehicle_that_is_not_ballasted_for_its_water_is_named(density, why, tmp_path):
     water = {'profile': [[0.0, density], [300.0, density + 0.1]]}
     scenario = load_scenario('slocum_shelf', {'dives': 0, 'duration_s': 1500.0, 'water': water})
     assert why in ''.join(unballasted(scenario)) and bool(why) == bool(unballasted(scenario))
-    depth = fly_scored(scenario)[1]['depth_m']['max']
+    run = glider.fly(scenario, out=tmp_path / 'run')
+    found = [text for kind, text in findings(read_run(run.folder)) if kind == 'problem']
+    assert any('whatever its pump does' in text for text in found) == bool(why)
+    depth = run.score['depth_m']['max']
     assert {'sinks whatever': depth > 250.0, '': 190.0 < depth < 210.0}.get(why, depth < 5.0)
     assert not any(unballasted(load_scenario(name)) for name in scenario_names())
 

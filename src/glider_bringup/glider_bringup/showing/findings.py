@@ -191,7 +191,7 @@ def findings(run: FlownRun) -> list[tuple[str, str]]:
 
     navigation = reckoned(card)
     problems, notes = _how_bad(card, traces), []
-    problems += [f'{text[0].upper()}{text[1:]}.' for text in run.unsteered]
+    problems += [f'{text[0].upper()}{text[1:]}.' for text in run.unfit]
     if navigation:
         notes += navigation_notes(navigation, run.scenario.navigation.current != 'none')
     notes += [f'Broken on purpose: {text}.' for text in fault_texts(card)]

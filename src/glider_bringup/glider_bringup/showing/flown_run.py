@@ -11,6 +11,7 @@ from glider_bringup.scoring.card import read_score
 from glider_bringup.scoring.traces import Tracer, Traces, load_traces, make_tracer
 from glider_bringup.showing.web_page import FlownRun
 from glider_guidance.settings import OLD_NAMES
+from glider_mission.planned import unballasted
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.run_folder import SCORE_FILE, TRACES_FILE, VEHICLE_FILE, scenario_of
@@ -78,8 +79,16 @@ def flown_run(
     as_flown = as_flown or scenario.to_yaml(vehicle=VEHICLE_FILE)
     vehicle = load_vehicle(scenario.vehicle)
     rules = scenario.score_rules(card['sim_time_s'])
-    slow = scenario.unsteered
-    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules, slow)
+    unfit = _unfit(scenario)
+    return FlownRun(run.resolve().name, scenario, as_flown, vehicle, card, traces, rules, unfit)
+
+
+def _unfit(scenario: Scenario) -> list[str]:
+    """What of its mission, or of its water, the vehicle is not fit for, in words."""
+    try:
+        return scenario.unsteered + unballasted(scenario)
+    except ValueError:  # the file of its water is gone since
+        return scenario.unsteered
 
 
 def keep_traces(scenario: Scenario, folder: Path, card: dict, tracer: Tracer) -> FlownRun:

@@ -86,7 +86,7 @@ class FlownRun(NamedTuple):
     card: dict[str, Any]
     traces: Traces | None  #: None if only the score is wanted
     rules: Rules  #: by which it is scored
-    unsteered: list[str]  #: which glides were too slow to be steered by roll, in words
+    unfit: list[str]  #: what the vehicle was not fit for, in words
 
     @property
     def is_rerouted(self) -> bool:
