@@ -56,7 +56,7 @@ _HEAR_S = 0.5
 #: The fork server is gone within this time (s) after the nodes.
 _END_S = 1.0
 #: A failure is seen within this time (s) after nodes left because of it, on a busy machine too.
-_AFTERMATH_S = 3.0
+_AFTERMATH_S = 10.0
 #: Of processes that are killed at the same moment one hears within this time (s).
 _TOGETHER_S = 0.1
 
