@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.ndimage import median_filter
 from scipy.optimize import nnls
 
 from glider_base.errors import ConfigurationError
@@ -189,7 +190,10 @@ SENSORS = ('m_depth', *CHARGE, *VOLTAGE, *OIL, CALL)
 
 
 def slocum_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
-    """Half hours of what the counter of charge counted, times the voltage."""
+    """Half hours of what the counter of charge counted, times the voltage.
+
+    One sample of voltage or oil that stands out from both beside it is none.
+    """
     sensors, files, _, notes = read_sensors(slocum_files(place), cache, progress, SENSORS)
     (time_s, charge), (volts_s, volts), (oil_s, oil) = (
         _liveliest(place, sensors, names) for names in (CHARGE, VOLTAGE, OIL)
@@ -197,7 +201,7 @@ def slocum_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
     if len(sensors['m_depth'][0]) < 2:
         raise ConfigurationError(f'{place}: no value of m_depth in its {len(files)} files')
     steps_s = np.diff(time_s)
-    volts = np.interp(time_s, volts_s, volts)
+    volts = np.interp(time_s, volts_s, median_filter(volts, 3, mode='nearest'))
     joules = _COULOMBS * np.diff(charge) * 0.5 * (volts[1:] + volts[:-1])
     depth = at_times(time_s, *sensors['m_depth'], GAP_S)
     sinks = vertical_rate(time_s, depth)[1:] > 0.0
@@ -206,7 +210,7 @@ def slocum_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
     known &= (joules >= 0.0) & (joules <= MOST_W * steps_s)
     is_up = middle < SURFACE_DEPTH_M
     calls = np.nan_to_num(at_times(time_s, *sensors[CALL]))[1:] > 0.5
-    pumped = np.diff(np.interp(time_s, oil_s, oil))
+    pumped = np.diff(np.interp(time_s, oil_s, median_filter(oil, 3, mode='nearest')))
     pumped[pumped < LEAST_CC] = 0.0
     doings = np.stack(
         [

@@ -190,7 +190,17 @@ def without_depth(sensors):
     sensors['m_depth'][1][1000:3000] = np.nan
 
 
-@pytest.mark.parametrize('harm', [set_back, off_for_a_moment, leaps, without_depth])
+def no_voltage(sensors):
+    sensors['m_battery'][1][5::200] = 0.0
+
+
+def spikes_of_oil(sensors):
+    sensors['m_de_oil_vol'][1][50::300] = 4000.0
+
+
+@pytest.mark.parametrize(
+    'harm', [set_back, off_for_a_moment, leaps, without_depth, no_voltage, spikes_of_oil]
+)
 def test_what_no_slocum_draws_and_what_no_depth_is_of_is_left_out(tmp_path, write_dbd, harm):
     pytest.importorskip('dbdreader')
     sensors = slocum(40)
