@@ -12,6 +12,8 @@ from hypothesis import settings
 import command_line
 
 gc.set_threshold(500_000)  # what is imported and compiled stays
+# Started in the background by a script, tests inherit that Ctrl-C is ignored, and try it in vain.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 # an example may wait for a compiler, or for a processor that others use
 settings.register_profile('glider', deadline=None)
 settings.load_profile('glider')
