@@ -182,10 +182,15 @@ def test_it_leaves_when_the_plant_gives_up(waiting):
         ),
     ],
 )
-def test_what_it_cannot_use_is_named(tmp_path, words, said):
-    env = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ}
+def test_what_it_cannot_use_is_named(tmp_path, words, said, **more):
+    env = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ, **more}
     process = command_line.Started(words, env, tmp_path, AUTOPILOT_MODULE)
     _, error = process.communicate(DEADLINE_S)
     assert process.returncode == 2
     assert f'fatal: {said}' in error
     assert 'Traceback' not in error
+
+
+def test_a_folder_for_logs_that_cannot_be_made_is_named(tmp_path):
+    said = 'no folder for logs: failed to initialize logging'
+    test_what_it_cannot_use_is_named(tmp_path, [], said, ROS_HOME='/proc/none', ROS_LOG_DIR='')

@@ -110,7 +110,10 @@ def stack():
         yield stack
 
 
-def test_client_sees_the_run_as_it_is_recorded(glider, start_glider, stack, tmp_path, port):
+def test_client_sees_the_run_as_it_is_recorded(
+    glider, start_glider, stack, tmp_path, port, monkeypatch
+):
+    monkeypatch.setenv('ROS_HOME', '/proc/none')  # nobody can write there, nor has to
     out = tmp_path / 'run'
     view = ('--view', '--view-port', port)
     process = start_glider('run', '--duration', 60, '--speed', 4, '--out', out, '--json', *view)

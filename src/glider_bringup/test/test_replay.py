@@ -316,8 +316,11 @@ def test_publishers_offer_what_was_recorded(short_run, replay, listen):
     assert 'Traceback' not in error + out
 
 
-def test_loop_begins_again_with_the_recorded_stamps(short_run, recorded, replay, listen):
+def test_loop_begins_again_with_the_recorded_stamps(
+    short_run, recorded, replay, listen, monkeypatch
+):
     listener = listen('/clock')
+    monkeypatch.setenv('ROS_HOME', '/proc/none')  # nobody can write there, nor has to
     process = replay(
         short_run,
         '--loop',

@@ -7,8 +7,10 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -284,6 +286,29 @@ def test_domain_that_a_run_was_given_is_not_drawn(monkeypatch):
         monkeypatch.delenv('ROS_DOMAIN_ID')
         with domain_id() as drawn:
             assert drawn != given
+
+
+@pytest.mark.skipif(os.getuid() != 0, reason='needs root, to become somebody else')
+def test_domains_that_another_person_had_are_free(monkeypatch):
+    with TemporaryDirectory() as folder:
+        os.chmod(folder, 0o1777)
+        monkeypatch.setattr(tempfile, 'tempdir', folder)
+        umask = os.umask(0o077)
+        for domain in range(1, 102):
+            monkeypatch.setenv('ROS_DOMAIN_ID', str(domain))
+            with domain_id():
+                pass
+        os.umask(umask)
+        monkeypatch.delenv('ROS_DOMAIN_ID')
+        child = os.fork()
+        if not child:
+            try:
+                os.setuid(65534)
+                with domain_id():
+                    os._exit(7)
+            finally:
+                os._exit(1)
+        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
 
 
 def test_domain_of_the_user_is_kept(monkeypatch):

@@ -24,6 +24,8 @@ _NAMESPACE = re.compile(r'(/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*)?/
 _DOMAINS = range(1, 102)
 #: Domains that there are ports for.
 MAX_DOMAIN = 232
+#: Argument of ROS: no files of logs in its home, which may not be writable. A run has its own.
+QUIET = '--disable-external-lib-logs'
 
 
 def absolute_namespace(text: str) -> str | None:
@@ -72,11 +74,15 @@ def _locked(domain: int, *kinds: int) -> int | None:
     """Lock of a domain, taken in these ways one after the other; None if somebody has it.
 
     Who draws a domain takes it alone first, so that nobody has it, and then shares it with those
-    that are given it: so it is in use until the last of them ends.
+    that are given it: so it is in use until the last of them ends. The file may be that of another
+    person, who lets it be read.
     """
     path = Path(tempfile.gettempdir()) / f'glider-ros-domain-{domain}.lock'
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        if not path.exists():
+            path.touch()
+            path.chmod(0o644)
+        descriptor = os.open(path, os.O_RDONLY)
     except OSError:
         return None
     try:

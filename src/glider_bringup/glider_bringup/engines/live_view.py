@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 from glider_base.errors import FATAL
-from glider_base.ros.places import NAMESPACE, domain_id
+from glider_base.ros.places import NAMESPACE, QUIET, domain_id
 from glider_base.settings import ConfigurationError
 from glider_bringup.engines.processes import OWN_CLOCK
 
@@ -28,7 +28,7 @@ def live_view(port: int, namespace: str | None = None) -> Iterator[tuple[str, Ca
     cannot be used, or the server is not installed.
     """
     with domain_id() as domain, _in_domain(domain):
-        ros = ['--ros-args', '-r', f'__ns:={namespace or NAMESPACE}']
+        ros = ['--ros-args', QUIET, '-r', f'__ns:={namespace or NAMESPACE}']
         ros += ['-p', f'port:={port}', '-p', 'led:=true']
         if namespace:
             ros += ['-r', ':='.join(OWN_CLOCK)]

@@ -18,7 +18,7 @@ from typing import IO, Any, Literal, NamedTuple
 
 from glider_base import wiring
 from glider_base.errors import FATAL
-from glider_base.ros.places import NAMESPACE, domain_id
+from glider_base.ros.places import NAMESPACE, QUIET, domain_id
 from glider_base.wiring import WIRING
 from glider_bringup.engines.fork_server import FORK_SERVER, tie_to
 from glider_bringup.engines.janitor import is_alive
@@ -91,7 +91,8 @@ def node_commands(
 
     With ``own_clock`` the clock lies in the namespace, so that gliders can share a ROS domain.
     """
-    ros = ['--ros-args', '--params-file', str(params_file), '-r', f'__ns:={namespace}']
+    ros = ['--ros-args', QUIET, '--params-file', str(params_file)]
+    ros += ['-r', f'__ns:={namespace}']
     if own_clock:
         ros += ['-r', ':='.join(OWN_CLOCK)]
     modules = process_modules(layout)

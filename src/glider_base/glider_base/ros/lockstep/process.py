@@ -60,7 +60,8 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
         with tempfile.TemporaryDirectory() as scratch:
             rclpy.init(args=_in_any_namespace(sys.argv if args is None else args, Path(scratch)))
     except Exception as error:
-        return _say(Stop(EXIT_USAGE, f'bad command line: {error}'))
+        what = 'no folder for logs' if 'initialize logging' in str(error) else 'bad command line'
+        return _say(Stop(EXIT_USAGE, f'{what}: {error}'))
     nodes, stop = [], Stop(0)
     try:
         for node_type in node_types:

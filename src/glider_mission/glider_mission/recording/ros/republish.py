@@ -20,7 +20,7 @@ from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.clock import MAX_TICKS_AHEAD
 from glider_base.ros.lockstep.executor import take
 from glider_base.ros.lockstep.node import COUNT_TICKS
-from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace, given_domain
+from glider_base.ros.places import NAMESPACE_ALLOWED, QUIET, absolute_namespace, given_domain
 from glider_base.ros.wire import topics
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS, message_class
@@ -261,7 +261,7 @@ class _Count:
 def replay(plan: Plan, rate: float) -> Iterator['Replay']:
     """Node that replays a plan; it is gone when the context ends."""
     given_domain()
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=['--ros-args', QUIET], signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = Node(
             topics.REPLAY,
