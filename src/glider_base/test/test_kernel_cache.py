@@ -177,8 +177,10 @@ def package(tmp_path):
             for name, text in {'__init__': '', **PARTS, **changed}.items():
                 (tmp_path / folder / 'parts' / f'{name}.py').write_text(text)
 
-        def call(self, folder: str, program: str = CALL) -> list[tuple[float, int]]:
-            env = dict(os.environ, GLIDER_CACHE=str(tmp_path / 'cache'))
+        def call(
+            self, folder: str, program: str = CALL, cache: str = str(tmp_path / 'cache')
+        ) -> list[tuple[float, int]]:
+            env = dict(os.environ, GLIDER_CACHE=cache)
             env['PYTHONDONTWRITEBYTECODE'] = '1'  # what is written within a second looks the same
             path = [str(tmp_path / folder), env.get('PYTHONPATH', '')]
             env['PYTHONPATH'] = os.pathsep.join(path)
@@ -236,6 +238,16 @@ def test_an_edit_flies_when_it_is_imported_and_not_before(package):
     assert package.call('here', only.replace('1.0', '5')) == [(150.0, 1)]
     package.write('here', laws=PARTS['laws'] + made)
     assert package.call('here', only + 'say(5)') == [(6.0, 0), (30.0, 0)]
+
+
+@pytest.mark.parametrize('place', ['/proc/none', '/dev/null'])
+def test_what_can_be_kept_nowhere_is_compiled_and_that_is_said_once(package, capfd, place):
+    package.write('here')
+    wanted = [(4.0, 1), (6.0, 1), (0.0, 1), (6.0, 1)]
+    assert package.call('here', cache=place) == wanted
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith(f'compiled mathematics cannot be kept in {place}/kernels: ')
+    assert 'GLIDER_CACHE' in line
 
 
 def test_what_was_not_used_for_longest_is_forgotten_first(monkeypatch, tmp_path):

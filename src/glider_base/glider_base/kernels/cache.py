@@ -17,6 +17,7 @@ import re
 import sys
 import time
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -176,7 +177,7 @@ class _Locator:
         return cls(function)
 
     def ensure_cache_path(self) -> None:
-        os.makedirs(self._folder, exist_ok=True)
+        """Nothing: the folder is made for what is kept first."""
 
     def get_cache_path(self) -> str:
         return self._folder
@@ -236,7 +237,11 @@ class KernelCache(FunctionCache):
             rtsys.initialize(target_context)
         else:
             target_context.refresh()
-        with self._guard_against_spurious_io_errors():
+        found = None
+        with (
+            self._guard_against_spurious_io_errors(),
+            suppress(NotADirectoryError, PermissionError),
+        ):
             found = self._load_overload(sig, target_context)
         if found is not None:
             path = self._cache_file._index_path
@@ -248,10 +253,25 @@ class KernelCache(FunctionCache):
         """Save what was compiled for a signature, if it can be of use to another session."""
         if not self._select(sig):
             return
-        os.makedirs(self.cache_path, exist_ok=True)
-        with open(os.path.join(self.cache_path, 'lock'), 'w') as lock:
+        try:
+            os.makedirs(self.cache_path, exist_ok=True)
+            lock = open(os.path.join(self.cache_path, 'lock'), 'w')
+        except OSError as error:
+            _say_unkept(str(folder()), error.strerror)
+            return
+        with lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
             super().save_overload(sig, data)
+
+
+@cache
+def _say_unkept(place: str, why: str) -> None:
+    """Say once why each command compiles anew."""
+    print(
+        f'compiled mathematics cannot be kept in {place}: {why}; every command compiles it anew '
+        '(allowed: GLIDER_CACHE = a folder that can be written)',
+        file=sys.stderr,
+    )
 
 
 def forget_old(largest: int = LARGEST) -> None:
