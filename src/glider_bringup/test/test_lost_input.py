@@ -188,6 +188,23 @@ def test_a_clock_that_is_set_forward_is_no_lost_input(flight, monkeypatch, heard
     assert not heard or SAFE not in vehicle.commands[before:]
 
 
+def test_who_commands_beside_the_guard_is_named(flight):
+    """Nobody on board hears the command: whoever else gives one moves the vehicle unseen."""
+    vehicle = flight.vehicle.node
+    helm = vehicle.create_publisher(JointState, 'command', 10)
+    flight.until(lambda: flight.vehicle.said('command is published by /glider/vehicle too'))
+    vehicle.destroy_publisher(helm)
+    second = GuardNode(
+        parameter_overrides=[Parameter('lockstep', value=False)],
+        context=vehicle.context,
+        namespace='/glider',
+    )
+    for topic in ('command', 'drop_weight'):
+        told = f'/glider/{topic} is published by /glider/guard_node too'
+        flight.until(lambda told=told: flight.vehicle.said(told))
+    second.destroy_node()
+
+
 def test_what_sinks_while_the_guard_is_paused_has_not_jumped(flight):
     """As a managed node that is deactivated for a minute; what jumps in a second has."""
     vehicle, depth_m = flight.vehicle, -LEVEL[2]

@@ -24,6 +24,7 @@ class GuardNode(BlockNode):
     def __init__(self, **kwargs) -> None:
         super().__init__(GUARD, **kwargs)
         self.create_service(Trigger, 'clear_guard', self.on_clear)
+        self.named: list[str] = []  #: rivals on its topics
         self.start_up()
 
     def forget(self) -> None:
@@ -35,6 +36,15 @@ class GuardNode(BlockNode):
         """Act no more, until `begin`; nobody knows how deep it is then."""
         super().pause()
         self.flags = None
+
+    def watch(self) -> None:
+        """Tell also who else commands: nobody on board hears that, and the vehicle obeys both."""
+        super().watch()
+        rivals = [] if self.ticks.lockstep else self.rivals()
+        if rivals and rivals != self.named:
+            said = f'{"; ".join(rivals)}: the vehicle may obey either'
+            self.event(self._newest_ns(), health.ERROR, said)
+        self.named = rivals
 
     def on_clear(self, request, response):
         """Serve ``clear_guard``; while an input is stale nobody knows how deep the vehicle is."""
