@@ -224,6 +224,13 @@ def test_nothing_left_is_refused_and_stays(cut_run, length):
     assert not [path for path in folder.iterdir() if path.name.startswith('.part')]
 
 
+def test_bag_that_was_cut_before_its_first_topic_is_one_of_no_topics(cut_run):
+    folder = cut_run(200)
+    assert recover(folder)['topics'] == {}
+    with AnyReader([folder]) as reader:
+        assert reader.connections == []
+
+
 def test_damaged_bag_that_is_not_cut_is_refused(short_run, tmp_path):
     file = tmp_path / file_of(short_run).name
     data = bytearray(file_of(short_run).read_bytes())

@@ -98,13 +98,14 @@ def metadata_text(files: Mapping[str, Summary]) -> str:
     start_ns = min(one.message_start_time for one in filled)
     duration_ns = max(0, max(one.message_end_time for one in filled) - start_ns)
     paths = ''.join(f'  - {name}\n' for name in files)
+    counted = ''.join(['\n', *topics.values()]) if topics else ' []\n'
     return (
         'version: 9\n'
         'storage_identifier: mcap\n'
         f'duration:\n  nanoseconds: {duration_ns}\n'
         f'starting_time:\n  nanoseconds_since_epoch: {start_ns}\n'
         f'message_count: {sum(one.message_count for one in said)}\n'
-        f'topics_with_message_count:\n{"".join(topics.values())}'
+        f'topics_with_message_count:{counted}'
         'compression_format: ""\n'
         'compression_mode: ""\n'
         f'relative_file_paths:\n{paths}'
