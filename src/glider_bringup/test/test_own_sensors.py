@@ -14,6 +14,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, Imu, JointState, NavSatFix
 
 from glider_base.frames import OriginSettings
@@ -244,6 +245,19 @@ def test_who_waits_for_a_clock_that_nobody_publishes_says_so_once(context, monke
         assert not flight.vehicle.odom
     finally:
         flight.close()
+
+
+def test_two_sources_of_time_are_named(context):
+    flight = Flight(context, use_sim_time=True)
+    other = rclpy.create_node('vehicle', namespace='/other', context=context)
+    try:
+        for node in (other, flight.vehicle.node):
+            node.create_publisher(Clock, '/clock', 1)
+        said = '/clock is published by /glider/vehicle and /other/vehicle'
+        flight.until(lambda: flight.vehicle.said(said))
+    finally:
+        flight.close()
+        other.destroy_node()
 
 
 def test_attitude_that_is_none_is_refused_and_named(flight):

@@ -24,7 +24,6 @@ class GuardNode(BlockNode):
     def __init__(self, **kwargs) -> None:
         super().__init__(GUARD, **kwargs)
         self.create_service(Trigger, 'clear_guard', self.on_clear)
-        self.named: list[str] = []  #: rivals on its topics
         self.start_up()
 
     def forget(self) -> None:
@@ -37,14 +36,9 @@ class GuardNode(BlockNode):
         super().pause()
         self.flags = None
 
-    def watch(self) -> None:
-        """Tell also who else commands: nobody on board hears that, and the vehicle obeys both."""
-        super().watch()
-        rivals = [] if self.ticks.lockstep else self.rivals()
-        if rivals and rivals != self.named:
-            said = f'{"; ".join(rivals)}: the vehicle may obey either'
-            self.event(self._newest_ns(), health.ERROR, said)
-        self.named = rivals
+    def heard_rivals(self) -> list[str]:
+        """Who else says what nobody tells apart, in words: the vehicle obeys all who command."""
+        return super().heard_rivals() + self.rivals()
 
     def on_clear(self, request, response):
         """Serve ``clear_guard``; while an input is stale nobody knows how deep the vehicle is."""

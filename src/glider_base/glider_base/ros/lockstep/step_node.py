@@ -7,8 +7,9 @@ import time
 
 from glider_base.block import Said
 from glider_base.ros.hearing.inputs import Input
-from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep import health, peers
 from glider_base.ros.lockstep.node import TickNode
+from glider_base.ros.wire.topics import TOPICS
 from glider_base.signals import TICK_NS, TICK_S
 from glider_base.wiring import SAMPLED, SLOW_S, WHEN_SILENT
 
@@ -64,6 +65,7 @@ class StepNode(TickNode):
         self.passed = 1  #: ticks that have passed since the last step, this one included
         self._cycle_s: float | None = None
         StepNode.forget(self)  # its own alone: a subclass has made nothing yet
+        self._rivals: list[str] = []
         self._stood = (0.0, time.monotonic())  #: time of the cycles, and since when it is that (s)
         self._reported = (0, 0, 0)
         self._tell_s = -float('inf')
@@ -87,8 +89,12 @@ class StepNode(TickNode):
         self.destroy_timer(self._timer)
 
     def watch(self) -> None:
-        """Tell also that free-running cycles cease, for the time of /clock stands still."""
+        """Free-running, tell also of rivals, and that cycles cease, as /clock stands still."""
         super().watch()
+        rivals = [] if self.ticks.lockstep else self.heard_rivals()
+        if rivals and rivals != self._rivals:
+            self.event(self._newest_ns(), health.ERROR, '; '.join(rivals))
+        self._rivals = rivals
         now_s = self.now_s()
         if now_s != self._stood[0]:
             self._stood = now_s, time.monotonic()
@@ -96,6 +102,15 @@ class StepNode(TickNode):
             said = 'use_sim_time, and no /clock: nothing is done until it comes'
             self.event(self._newest_ns(), health.ERROR, said)
             self._stood = now_s, math.inf  # once
+
+    def heard_rivals(self) -> list[str]:
+        """Who else says what nobody tells apart, in words: that is the time of /clock."""
+        is_simulated, clock = self.cycle_clock is not self.steady_clock, TOPICS['/clock']
+        names = sorted({*peers.publishers(self, clock).values()} - {''}) if is_simulated else []
+        if len(names) < 2:
+            return []
+        name = self.resolve_topic_name(clock.name)
+        return [f'{name} is published by {" and ".join(names)}; {peers.ALONE}']
 
     @property
     def sample_period_s(self) -> float:
