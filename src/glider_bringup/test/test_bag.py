@@ -137,6 +137,12 @@ def test_recording_is_never_written_over_another(tmp_path):
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
 
 
+def test_attachment_that_is_not_there_leaves_no_file_in_the_way(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        BagWriter(tmp_path, 'run', attachments=[tmp_path / 'nix.yaml'])
+    BagWriter(tmp_path, 'run').close()
+
+
 def test_metadata_has_the_shape_of_jazzy(folder):
     information = yaml.safe_load((folder / 'metadata.yaml').read_text())
     assert list(information) == ['rosbag2_bagfile_information']

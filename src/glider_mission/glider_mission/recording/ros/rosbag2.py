@@ -111,6 +111,7 @@ class BagWriter:
             if path.exists():
                 reason = 'exists; a recording is never written over another'
                 raise FileExistsError(errno.EEXIST, reason, str(path))
+        attached = [(path, path.read_bytes()) for path in map(Path, attachments)]
         topics = list(topics)
         self._names = names or {topic.name: topic.full_name('/glider') for topic in topics}
         self._mcap = McapWriter(file, profile='ros2')
@@ -130,9 +131,8 @@ class BagWriter:
                 Channel(number, self._names[topic.name], 'cdr', metadata, schemas[kind])
             )
             self._channels[topic.name] = number
-        for path in attachments:
-            path = Path(path)
-            self._mcap.add_attachment(path.name, 'application/yaml', path.read_bytes())
+        for path, data in attached:
+            self._mcap.add_attachment(path.name, 'application/yaml', data)
         self.flush()
 
     def write(self, topic: str, stamp_ns: int, payload: bytes) -> None:
