@@ -15,13 +15,16 @@ from mcap.records import Message
 from mcap.stream_reader import StreamReader
 from mcap_ros2.reader import read_ros2_messages
 from nav_msgs.msg import Path as PathMessage
+from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from glider_base.ros.lockstep import health
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
+from glider_bringup.nodes.recorder_node import RecorderNode
 from glider_bringup.scoring.traces import TRACED
 from glider_mission.blocks import BLOCK_TICKS, COLUMNS
 from glider_mission.recording.mcap_reader import Bag
@@ -141,6 +144,14 @@ def test_attachment_that_is_not_there_leaves_no_file_in_the_way(tmp_path):
     with pytest.raises(FileNotFoundError):
         BagWriter(tmp_path, 'run', attachments=[tmp_path / 'nix.yaml'])
     BagWriter(tmp_path, 'run').close()
+
+
+def test_recorder_with_a_misspelt_parameter_leaves_no_file_in_the_way(context, tmp_path):
+    given = {'folder': str(tmp_path), 'nmae': 'mine'}
+    overrides = [Parameter(name, value=value) for name, value in given.items()]
+    with pytest.raises(ConfigurationError, match='nmae: unknown'):
+        RecorderNode(context=context, parameter_overrides=overrides)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_metadata_has_the_shape_of_jazzy(folder):

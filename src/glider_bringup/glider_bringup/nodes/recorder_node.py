@@ -25,7 +25,7 @@ from glider_base.ros.lockstep.executor import take, take_with_info
 from glider_base.ros.lockstep.node import TickNode
 from glider_base.ros.lockstep.peers import FAREWELL_S
 from glider_base.ros.lockstep.process import Stop, entry
-from glider_base.ros.parameters import declare_settings
+from glider_base.ros.parameters import declare_settings, refuse_unknown
 from glider_base.ros.wire import qos, topics
 from glider_base.ros.wire.codec import MessageError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
@@ -65,6 +65,7 @@ class RecorderNode(TickNode):
     def __init__(self, **kwargs) -> None:
         super().__init__(topics.RECORDER, **kwargs)
         self.settings = declare_settings(self, RecorderSettings)
+        refuse_unknown(self)  # before there is a file
         recorded = recorded_topics(self.settings.topics)
         per_tick = [topic.name for topic in recorded if topic.per_tick]
         try:
