@@ -8,6 +8,7 @@ import time
 
 import pytest
 import rclpy
+from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -243,6 +244,24 @@ def test_who_waits_for_a_clock_that_nobody_publishes_says_so_once(context, monke
         flight.wait(2.0)
         assert sum('/clock' in told for told in flight.vehicle.told) == 1
         assert not flight.vehicle.odom
+    finally:
+        flight.close()
+
+
+def test_a_negative_time_is_refused_and_ends_no_node(context):
+    """As of a vehicle that counts down to its release."""
+    flight = Flight(context, use_sim_time=True)
+    try:
+        clock = flight.vehicle.node.create_publisher(Clock, '/clock', 1)
+
+        def is_told(sec: int, condition) -> bool:
+            clock.publish(Clock(clock=Time(sec=sec)))
+            return condition()
+
+        flight.until(lambda: is_told(5, lambda: flight.navigation.now_s() == 5.0))
+        said = 'message refused: /clock: clock.sec is -5 (allowed: >= 0)'
+        flight.until(lambda: is_told(-5, lambda: flight.vehicle.said(said)))
+        flight.until(lambda: is_told(6, lambda: flight.navigation.now_s() == 6.0))
     finally:
         flight.close()
 

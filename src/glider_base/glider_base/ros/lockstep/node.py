@@ -18,6 +18,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock as ClockMessage
 
 from glider_base.block import Said
 from glider_base.errors import EXIT_PEER
@@ -121,6 +122,20 @@ class TickNode(Node):
         return super().set_parameters_atomically(parameter_list)
 
     # ------------------------------------------------------------------ inputs and outputs
+
+    def create_subscription(self, msg_type, topic, callback, *args, **kwargs):
+        """Subscribe; rclpy, which subscribes to /clock so, lets a negative time end the node."""
+        if msg_type is ClockMessage and not kwargs.get('raw'):
+            callback = partial(self._on_time, Input(TOPICS['/clock'], False), callback)
+        return super().create_subscription(msg_type, topic, callback, *args, **kwargs)
+
+    def _on_time(self, item: Input, take: Callable, message: ClockMessage) -> None:
+        """Let rclpy take the time."""
+        if message.clock.sec >= 0:
+            take(message)
+        else:
+            said = f'/clock: clock.sec is {message.clock.sec} (allowed: >= 0)'
+            self.refuse(item, lambda: said)
 
     def _publisher(self, topic: Topic):
         return self.create_publisher(
