@@ -56,6 +56,8 @@ def _ticks(run: Path) -> dict[str, Any]:
                 raise ConfigurationError(f'{run}: its nodes were free-running')
         with scenario_of(run, bag.attachments) as flown:
             log = read_back(bag, flown.scenario.vehicle, [])
+            if not log.ticks and log.counts:
+                raise ConfigurationError(f'{run}: {log.lacks}, as in a free-running recording')
             found['ticks_planned'] = planned_ticks(flown.scenario)
     except ConfigurationError as error:  # of others, or what was flown is not known
         messages.print(f'ticks are not counted: {error}', soft_wrap=True)
