@@ -91,7 +91,7 @@ class StepNode(TickNode):
     def watch(self) -> None:
         """Free-running, tell also of rivals, and that cycles cease, as /clock stands still."""
         super().watch()
-        rivals = [] if self.ticks.lockstep else self.heard_rivals()
+        rivals = [] if self.ticks.lockstep else sorted(self.heard_rivals())
         if rivals and rivals != self._rivals:
             self.event(self._newest_ns(), health.ERROR, '; '.join(rivals))
         self._rivals = rivals
