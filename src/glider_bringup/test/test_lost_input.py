@@ -149,6 +149,55 @@ def test_nothing_is_cleared_while_nobody_knows_how_deep_the_vehicle_is(context, 
         guard.destroy_node()
 
 
+@pytest.mark.parametrize(
+    ('depth_m', 'comes', 'goes'),
+    [
+        (50.0, ['joint_states'], True),  # navigation or control is dead, and the pump, too
+        (50.0, ['joint_states', 'odom'], True),
+        (50.0, [], False),  # nobody hears it
+        (0.5, ['joint_states'], False),  # on deck, or afloat
+        (50.0, ['joint_states', 'up'], False),
+        (50.0, ['joint_states', 'contact'], False),
+    ],
+)
+def test_the_weight_goes_where_input_is_lost_and_nothing_shows_it_up(
+    context, monkeypatch, depth_m, comes, goes
+):
+    free = [Parameter('lockstep', value=False), Parameter('drop_blind_s', value=600.0)]
+    guard, time_s, sent = GuardNode(context=context, parameter_overrides=free), [100.0], []
+    monkeypatch.setattr(guard, 'now_s', lambda: time_s[0])
+    guard.senders[1] = lambda stamp_ns, values: sent.append((time_s[0], *values))
+    says = dict(INPUTS, odom=(0.0, 0.0, -depth_m, *INPUTS['odom'][3:]), demand=(0.4, 0.0, 0.0))
+
+    def cycle(names, **more) -> None:
+        time_s[0] += 0.5
+        for item in guard.inputs:
+            name, stamp_ns = item.topic.name, round(time_s[0] * 10) * TICK_NS
+            if name in names:
+                values = more.get(name, says.get(name, at_rest(name)))
+                item.accept_newest(item.topic.codec.encode(stamp_ns, values), time_s[0], 1.0)
+        guard._on_cycle()
+
+    try:
+        for _ in range(20):
+            cycle([*says])
+        lost_s = time_s[0]
+        more = {'health': (0.0, -1.0, 0.0)} if 'contact' in comes else {}
+        if 'up' in comes:
+            comes, more = [*comes, 'odom'], {'odom': (0.0, 0.0, -0.5, *says['odom'][3:])}
+        while time_s[0] < lost_s + 1200.0:
+            cycle([*comes, *more], **more)
+        dropped = [at_s - lost_s for at_s, says_so in sent if says_so]
+        assert bool(dropped) == goes
+        if goes:  # 600 s, and the way up at climb_mps
+            assert dropped[0] == pytest.approx(600.0 + 50.0 / 0.15, abs=20.0)
+            cycle([*says])
+            assert sent[-1][1] == 0.0  # what is to be seen again decides
+    finally:
+        guard.close()
+        guard.destroy_node()
+
+
 def test_what_comes_with_a_stamp_that_stands_still_is_told_from_what_does_not_come(flight):
     vehicle = flight.vehicle
     first = {}

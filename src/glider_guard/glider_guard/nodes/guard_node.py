@@ -2,17 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The guard as a node: demand and all that is measured in; command and drop_weight out."""
 
+import math
 import sys
 
 from std_srvs.srv import Trigger
 
+from glider_base.frames import odometry_from_wire
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import entry
 from glider_base.signals import TICK_S, Joints
 from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
 from glider_guard.block import GUARD
-from glider_guard.depth import SURFACE_M
+from glider_guard.witness import AFLOAT_M, HEARD_S, SURFACE_M
+from glider_model.ocean.density import depth_at
 
 
 class GuardNode(BlockNode):
@@ -29,7 +32,8 @@ class GuardNode(BlockNode):
     def forget(self) -> None:
         """Know nothing, as at the start."""
         super().forget()
-        self.stale_ticks, self.ascent = 0, INITIAL_ASCENT
+        self.stale_ticks, self.blind_ticks, self.ascent = 0, 0, INITIAL_ASCENT
+        self.drops = False
 
     def pause(self) -> None:
         """Act no more, until `begin`; nobody knows how deep it is then."""
@@ -80,18 +84,45 @@ class GuardNode(BlockNode):
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick."""
-        self.stale_ticks, self.ascent = 0, INITIAL_ASCENT
+        self.stale_ticks, self.blind_ticks, self.ascent = 0, 0, INITIAL_ASCENT
+        self.drops = False
         super().step(stamp_ns, *inputs)
 
     def on_stale(self, stamp_ns: int, cycles: int) -> None:
-        """Command what surfaces the vehicle, after a while for good."""
+        """Command what surfaces the vehicle, after a while for good; let the weight go at last.
+
+        That is where it was under water, goes on to say how its actuators are, and is not seen up.
+        """
         before, self.stale_ticks = self.stale_ticks, self.stale_ticks + cycles
         if before < round(self.settings.lost_after_s / TICK_S) <= self.stale_ticks:
             self.surface(health.SURFACE)
             said = f'input lost for {self.settings.lost_after_s:g} s: surfacing for good'
             self.event(stamp_ns, health.ERROR, said)
-        publish_command = self.senders[0]
+        publish_command, publish_weight = self.senders
         publish_command(stamp_ns, self._come_up(cycles))
+        limits, last_m = self.params.depth, self.state.depths.depth
+        is_there = last_m > AFLOAT_M and 'joint_states' not in self._stale
+        self.blind_ticks = self.blind_ticks + cycles if is_there and not self._is_seen_up() else 0
+        drop_s = limits.drop_blind_s + last_m / limits.climb_mps
+        if self.blind_ticks * TICK_S > drop_s:
+            if not self.drops:
+                said = f'input lost, not seen up for {drop_s:,.0f} s: the weight is let go'
+                self.event(stamp_ns, health.ERROR, said)
+            self.drops = True
+            publish_weight(stamp_ns, (1.0,))
+
+    def _is_seen_up(self) -> bool:
+        """Whether a depth that still comes, or a contact, is that of a vehicle at the surface."""
+        now_s = self.now_s()
+        fresh = {
+            item.topic.name: item.values
+            for item in self.inputs
+            if item.values and now_s - item.arrived_s <= self.max_age_s(item.topic.name)
+        }
+        depths = [depth_at(fresh['pressure'][0])] if 'pressure' in fresh else []
+        depths += [odometry_from_wire(fresh['odom']).p_d] if 'odom' in fresh else []
+        contact_age_s = fresh['health'][2] if 'health' in fresh else -1.0
+        return min(depths, default=math.inf) < AFLOAT_M or 0.0 <= contact_age_s < HEARD_S
 
 
 main = entry(GuardNode)
