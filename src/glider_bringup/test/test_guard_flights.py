@@ -436,6 +436,12 @@ def test_who_is_fouled_until_it_hangs_in_its_dive_comes_up():
     assert flown.depth.max() > 80.0 and flown.depth[-1] < AT_SURFACE_M
 
 
+def test_who_is_too_light_for_the_water_at_its_depth_comes_up():
+    """Led out of one stall after the other it went between 63 and 100 m to the end of its run."""
+    flown = fly('slocum_shelf', 5000.0, **{'water.pycnocline_rise': 0.0045})
+    assert flown.depth.max() > 90.0 and flown.depth[-1] < AT_SURFACE_M
+
+
 def test_way_over_ground_that_a_tilt_shows_as_way_up_is_none():
     """It believed to rise as it was asked to, and sank out of its yo."""
     yo = {'profile.depth_m': 20.0, 'profile.top_depth_m': 3.0, 'profile.pitch_deg': 16.9}

@@ -112,6 +112,18 @@ def test_a_plan_tells_time_and_energy_of_a_flight_that_surfaces_and_of_one_that_
     assert planning._report(made, scenario)['surfacings'] == pytest.approx(surfacings, rel=0.15)
 
 
+@pytest.mark.parametrize('rise', [0.001, 0.002, 0.003])
+def test_a_plan_knows_that_a_pump_has_no_more_than_its_range(rise):
+    """Where the water asks for more, a dive is slower than by its net buoyancy."""
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 20_000.0, 'at_end': 'stop'}
+    still = {'current.speed_kn': 0.0, 'water.pycnocline_rise': rise, 'dives': 0}
+    scenario = load_scenario('slocum_shelf', {'path': path, 'duration_s': 2e5, **still})
+    flown = glider.fly(scenario).score
+    made = planned(scenario)
+    assert made.arrival_s(50.0) == pytest.approx(flown['arrival']['t_s'], rel=0.03)
+    assert made.wh == pytest.approx(flown['energy']['wh'], rel=0.1)
+
+
 @pytest.mark.parametrize(
     ('vehicle', 'depth_m', 'net_heaviness_kg'),
     [('seaglider', 200.0, 0.2), ('seaglider', 600.0, 0.15), ('zhang2021', 300.0, 0.4)],
@@ -188,6 +200,12 @@ def test_a_vehicle_that_is_not_ballasted_for_its_water_is_named(density, why, tm
     depth = run.score['depth_m']['max']
     assert {'sinks whatever': depth > 250.0, '': 190.0 < depth < 210.0}.get(why, depth < 5.0)
     assert not any(unballasted(load_scenario(name)) for name in scenario_names())
+
+
+@pytest.mark.parametrize(('rise', 'why'), [(0.003, ''), (0.0045, 'at 200 m, it floats whatever')])
+def test_a_vehicle_that_is_too_light_for_the_water_at_its_depth_is_named(rise, why):
+    scenario = load_scenario('slocum_shelf', {'water.pycnocline_rise': rise})
+    assert why in ''.join(unballasted(scenario)) and bool(why) == bool(unballasted(scenario))
 
 
 def test_a_planned_flight_has_its_route_as_orders_and_flies_so_to_the_same_bits(tmp_path):

@@ -21,8 +21,9 @@ MEAN_S = 10.0
 #: A depth that changes by no more than this (m), or than this share of the way down by pump and
 #: pitch, rests.
 AT_REST_M, AT_REST_SHARE = 1.0, 0.25
-#: One that is asked down goes farther than this many times the same depth, or hangs. It may swing.
-FARTHER = 4.0
+#: One that is asked down goes farther than this many times the same depth down, or up, or hangs:
+#: it may swing, and one that has no weight to go on is led out of a stall again and again.
+DEEPER, HIGHER = 4.0, 24.0
 #: For longer than this (s) the depth lags behind the vertical rate before it is reported.
 LAG_S = 10.0
 #: The past of the lag fades with this time (s).
@@ -190,7 +191,8 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
         mark = depth
     mean, before = state.mean + dt / MEAN_S * (depth - state.mean), state.least
     dives = under and at.target > depth and not at.surfaces
-    is_held = dives and abs(depth - state.hangs) < FARTHER * limits.stalled_m
+    gone = (depth - state.hangs) / limits.stalled_m
+    is_held = dives and -HIGHER < gone < DEEPER
     hangs = state.hangs if is_held else depth
     near = state.near + dt / limits.stall_mean_s * (depth - state.near)
     if abs(depth - state.depth) > limits.jump_m:  # it was set anew

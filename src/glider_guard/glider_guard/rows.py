@@ -125,7 +125,8 @@ ROWS = (
     Row(
         STALLED,
         'stalled',
-        'under water at the same depth; if it is asked down, give or take four times as much',
+        'under water at the same depth; if it is asked down, no deeper by four times as much, '
+        'unless it rises by 24 times as much',
         'stalled_m, stalled_s',
         'stays at one depth',
     ),

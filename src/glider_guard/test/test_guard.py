@@ -404,13 +404,16 @@ def test_who_moves_by_more_than_a_few_metres_does_not_stand_still(swing_m, told)
     assert bool(now & rows.STALLED) == told
 
 
-@pytest.mark.parametrize(('sinks_mps', 'told'), [(0.009, True), (0.013, False)])
-def test_who_is_asked_down_and_swings_near_one_depth_stalls(sinks_mps, told):
-    """By 4 m in 7 minutes, as one that stalls and is brought out of it again and again."""
-    vehicle, now, turns = Vehicle(depth_m=20.0), 0, 2.0 * math.pi / 420.0
+@pytest.mark.parametrize(
+    ('sinks_mps', 'swing_m', 'period_s', 'told'),
+    [(0.009, 4.0, 420.0, True), (0.013, 4.0, 420.0, False), (0.0, 44.0, 1080.0, True)],
+)
+def test_who_is_asked_down_and_swings_near_one_depth_stalls(sinks_mps, swing_m, period_s, told):
+    """As one that stalls and is brought out of it again and again, in even water and denser."""
+    vehicle, now, turns = Vehicle(depth_m=80.0), 0, 2.0 * math.pi / period_s
     vehicle.target = 200.0
     for second in range(4000):
-        now |= vehicle.go(1.0, rate=sinks_mps + 2.0 * turns * math.cos(turns * second))
+        now |= vehicle.go(1.0, rate=sinks_mps + 0.5 * swing_m * turns * math.cos(turns * second))
     assert bool(now & rows.STALLED) == told
 
 

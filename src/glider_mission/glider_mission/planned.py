@@ -34,18 +34,19 @@ def horizontal_speed(scenario: Scenario, vehicle: Vehicle | None = None) -> floa
 
 
 def unballasted(scenario: Scenario) -> list[str]:
-    """Whether the pump of its vehicle is too small for the water where it starts, in words."""
+    """Whether the pump of its vehicle is too small for the water of its dives, in words."""
     plant = scenario.plant_settings().params()
-    vehicle = plant.vehicle
-    if vehicle.volume == 0.0:  # neutral there
-        return []
-    most = vehicle.m_b_max
-    out, full = (immersed(0.0, oil, vehicle, plant.density) for oil in (-most, most))
-    if out.net <= 0.0 <= full.net:
-        return []
-    off_kg, how = (out.net, 'sinks') if out.net > 0.0 else (-full.net, 'floats')
-    density = out.ratio * SEA_WATER_DENSITY
-    return [
-        f'in water of {density:.1f} kg/m^3, as at its start, it {how} whatever its pump does: '
-        f'by {off_kg:.2g} kg; ballast it in its vehicle file (volume, rigid_body)'
-    ]
+    vehicle, most = plant.vehicle, plant.vehicle.m_b_max
+    depths = {0.0: 'its start'} if vehicle.volume else {}  # without one it is neutral there
+    if scenario.profile.mode == 'profile':
+        depths[scenario.profile.depth_m] = f'{scenario.profile.depth_m:,.0f} m'
+    for depth, where in depths.items():
+        out, full = (immersed(depth, oil, vehicle, plant.density) for oil in (-most, most))
+        if not out.net <= 0.0 <= full.net:
+            off_kg, how = (out.net, 'sinks') if out.net > 0.0 else (-full.net, 'floats')
+            density = out.ratio * SEA_WATER_DENSITY
+            return [
+                f'in water of {density:.1f} kg/m^3, as at {where}, it {how} whatever its pump '
+                f'does: by {off_kg:.2g} kg; ballast it in its vehicle file (volume, rigid_body)'
+            ]
+    return []
