@@ -18,7 +18,11 @@ from glider_mission.scenario import Scenario
 from glider_model.ocean.bottom import FlatBottom, bottom_depth, least_height
 from glider_model.ocean.density import immersed
 from glider_model.onboard.command_filter import Filtered, filter_angle
-from glider_model.onboard.glide_polar import glide_net_heaviness
+from glider_model.onboard.glide_polar import (
+    MODEL_VERTICAL_RATE,
+    glide_net_heaviness,
+    glide_vertical_rate,
+)
 from glider_model.vehicle.file import load_vehicle
 
 #: A route is straightened where that moves it by less than the first of these (m) by which it can
@@ -110,36 +114,65 @@ def pace_of(scenario: Scenario) -> Pace:
     stay_s = (profile.wait_ticks + profile.prepare_ticks) * TICK_S if every else 0.0
     turns = dives - (every > 0)  # that are not at the surface
     glide_s = 2.0 * (dives * profile.depth - turns * profile.top_depth) / profile.glide_rate
-    cycle_s = glide_s + 2.0 * dives * profile.lead_s + stay_s
+    oil, weights = _oil_and_weights(scenario, params)
+    slower_s = glide_s * _slower(weights, params)
+    cycle_s = glide_s + slower_s + 2.0 * dives * profile.lead_s + stay_s
     speed = _HELD_SHARE * glide_s * params.profile_speed / cycle_s
-    cycle_wh, dive_wh = _energy(scenario, params, cycle_s, stay_s)
+    cycle_wh, dive_wh = _energy(scenario, params, oil, cycle_s, stay_s)
     return Pace(speed, cycle_s, stay_s / cycle_s, cycle_wh, dives, dive_wh)
 
 
+def _oil_and_weights(scenario: Scenario, params: GuidanceParams) -> tuple[np.ndarray, np.ndarray]:
+    """Oil (kg, + sinks) that the weights of dive and climb ask for, and what these are (kg).
+
+    float64[2, _LEVELS] each. Where the pump has less than that, the weights are less.
+    """
+    profile, body = params.profile, load_vehicle(scenario.vehicle).params()
+    water = scenario.resolved_water().params()
+    empty = [immersed(z, 0.0, body, water) for z in _levels(params).tolist()]
+    nets, ratios = np.array([(one.net, one.ratio) for one in empty]).T
+    wanted = np.array([[profile.net_heaviness], [-profile.climb_net_heaviness]])
+    oil = (wanted - nets) / ratios
+    there = np.clip(oil, -body.m_b_max, body.m_b_max)
+    return oil, np.where(there == oil, wanted, nets + ratios * there)
+
+
+def _levels(params: GuidanceParams) -> np.ndarray:
+    """Depths (m), float64[_LEVELS], at which a dive is looked at."""
+    return np.linspace(0.0, params.profile.depth, _LEVELS)
+
+
+def _slower(weights: np.ndarray, params: GuidanceParams) -> float:
+    """How much longer than by its weights a dive takes by those of `_oil_and_weights` (-)."""
+    profile, more = params.profile, 0.0
+    dive = -profile.pitch, profile.net_heaviness, profile.dive_rate
+    climb = profile.climb_pitch, -profile.climb_net_heaviness, profile.climb_rate
+    for levels, (pitch, wanted, rate) in zip(weights, (dive, climb), strict=True):
+        for weight in levels[levels != wanted].tolist():
+            weight = wanted * max(0.0, weight / wanted)  # of one that floats up: nothing
+            slow = abs(glide_vertical_rate(pitch, weight, params.polar))
+            more += (1.0 / max(slow, MODEL_VERTICAL_RATE) - 1.0 / rate) / _LEVELS
+    return 0.5 * profile.glide_rate * more
+
+
 def _energy(
-    scenario: Scenario, params: GuidanceParams, cycle_s: float, stay_s: float
+    scenario: Scenario, params: GuidanceParams, oil: np.ndarray, cycle_s: float, stay_s: float
 ) -> tuple[float | None, float]:
     """Energy (Wh) of `Pace.cycle_s`: pump, electronics and, at the surface, a call; `dive_wh`."""
     vehicle, profile = load_vehicle(scenario.vehicle), params.profile
     if vehicle.energy is None:
         return None, 0.0
     energy, body = vehicle.energy.params(), vehicle.params()
-    levels = np.linspace(0.0, profile.depth, _LEVELS)
-    water = scenario.resolved_water().params()
-    empty = [immersed(float(depth), 0.0, body, water) for depth in levels]
-
-    def heaviness(net: float) -> np.ndarray:
-        """What the pump makes of it (kg) at the levels for a net weight (kg)."""
-        return np.array([(net - one.net) / one.ratio for one in empty])
-
-    sinking, rising = heaviness(profile.net_heaviness), heaviness(-profile.climb_net_heaviness)
+    sinking, rising = np.clip(oil, -body.m_b_max, body.m_b_max)
     out_kg = np.maximum(0.0, -np.diff(sinking)) + np.maximum(0.0, np.diff(rising))
-    heavy = sinking[-1]
+    heavy = oil[0, -1]
     law = scenario.control.buoyancy  # it takes a part of what the water makes of it for drag
     as_drag = law.drag_ki_kg_per_m / (law.ki_kg_per_m + law.drag_ki_kg_per_m or 1.0)
-    out_kg[-1] += heavy - rising[-1] + 2.0 * as_drag * max(0.0, heavy - profile.net_heaviness)
+    out_kg[-1] += sinking[-1] - rising[-1]
+    out_kg[-1] += 2.0 * as_drag * max(0.0, heavy - profile.net_heaviness)
     # as much pumped out at a level, and let in again (J/kg)
-    costs = np.maximum(0.0, energy.out + energy.out_per_m * levels) + max(0.0, energy.let_in)
+    costs = np.maximum(0.0, energy.out + energy.out_per_m * _levels(params))
+    costs += max(0.0, energy.let_in)
     dives, call, top = max(1, profile.surface_every), 0.0, 0.0
     if stay_s:
         over_kg = min(_over_kg(params, vehicle.slowest_pump_rate(0.0)), body.m_b_max + rising[0])
@@ -329,8 +362,11 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
     forecast = forecast_of(scenario, pace.stay)
     chart, land = forecast.sailed(forecast.chart), forecast.land
     if scenario.dives:
-        cycles = scenario.dives / max(1, scenario.profile.surface_every_dives)
-        end_s = min(end_s, cycles * pace.cycle_s)
+        every = scenario.profile.surface_every_dives
+        cycles = scenario.dives / max(1, every)
+        # the last wait is not flown
+        left_out_s = min(1.0, cycles) * scenario.profile.wait_s if every else 0.0
+        end_s = min(end_s, cycles * pace.cycle_s - left_out_s)
     waypoints = waypoints_of(scenario)
     bottom = scenario.bottom()
     route = route_round(chart, land, bottom, waypoints, 0.0, pace.speed, end_s)
