@@ -202,9 +202,13 @@ def test_a_vehicle_that_is_not_ballasted_for_its_water_is_named(density, why, tm
     assert not any(unballasted(load_scenario(name)) for name in scenario_names())
 
 
-@pytest.mark.parametrize(('rise', 'why'), [(0.003, ''), (0.0045, 'at 200 m, it floats whatever')])
-def test_a_vehicle_that_is_too_light_for_the_water_at_its_depth_is_named(rise, why):
-    scenario = load_scenario('slocum_shelf', {'water.pycnocline_rise': rise})
+@pytest.mark.parametrize(
+    ('rise', 'bottom_m', 'why'),
+    [(0.003, 0.0, ''), (0.0045, 0.0, 'at 200 m, it floats whatever'), (0.0045, 60.0, '')],
+)
+def test_a_vehicle_too_light_for_the_water_of_its_dives_is_named(rise, bottom_m, why):
+    water = {'water.pycnocline_rise': rise, 'water.bottom_m': bottom_m}
+    scenario = load_scenario('slocum_shelf', water)
     assert why in ''.join(unballasted(scenario)) and bool(why) == bool(unballasted(scenario))
 
 

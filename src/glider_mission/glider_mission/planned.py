@@ -4,6 +4,8 @@
 
 import math
 
+import numpy as np
+
 from glider_base.signals import SEA_WATER_DENSITY, TICK_S
 from glider_guidance.guidance import path_time_s
 from glider_guidance.yo.machine import mission_time_s
@@ -39,7 +41,8 @@ def unballasted(scenario: Scenario) -> list[str]:
     vehicle, most = plant.vehicle, plant.vehicle.m_b_max
     depths = {0.0: 'its start'} if vehicle.volume else {}  # without one it is neutral there
     if scenario.profile.mode == 'profile':
-        depths[scenario.profile.depth_m] = f'{scenario.profile.depth_m:,.0f} m'
+        deepest = min(scenario.profile.depth_m, float(np.max(scenario.bottom().depth)))
+        depths[deepest] = f'{deepest:,.0f} m'
     for depth, where in depths.items():
         out, full = (immersed(depth, oil, vehicle, plant.density) for oil in (-most, most))
         if not out.net <= 0.0 <= full.net:
