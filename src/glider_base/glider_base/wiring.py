@@ -248,3 +248,8 @@ def readers(topic: str) -> tuple[Wired, ...]:
 def at_rest(topic: str) -> tuple[float, ...]:
     """Numbers of a message of a vehicle at rest: all zero, but for the identity quaternion."""
     return tuple(float(field.endswith('orientation.w')) for field in FIELDS[topic])
+
+
+def not_fitted(topic: str) -> tuple[float, ...]:
+    """Numbers in the place of a sensor that is not fitted: all zero, and no fix."""
+    return WHEN_SILENT.get(topic, len(FIELDS[topic]) * (0.0,))

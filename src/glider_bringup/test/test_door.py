@@ -10,7 +10,7 @@ import pickle
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import nullcontext, redirect_stdout
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -34,7 +34,7 @@ import glider_bringup as glider
 from glider_base.kernel import kernel, on_compiling
 from glider_base.settings import ConfigurationError
 from glider_bringup import console
-from glider_bringup.cli import OF_THE_SCRIPT, app
+from glider_bringup.cli import OF_THE_SCRIPT, _added, app
 from glider_bringup.door.export import write_mat
 from glider_bringup.door.run import chosen_scenario
 from glider_guidance.method import method_step as guidance_step
@@ -808,6 +808,26 @@ def test_every_command_prints_json_or_says_that_it_does_not(name):
     command = typer.main.get_command(app).get_command(None, name)
     options = [option for one in command.params for option in one.opts]
     assert '--json' in options or 'no JSON' in command.help or name in OF_THE_SCRIPT
+
+
+@pytest.mark.parametrize(
+    ('functions', 'called', 'words'),
+    [
+        (['count'], 'count', ['x']),
+        (['greet'], 'hello', ['x']),  # one function: the command, whatever it is called
+        (['one', 'two'], 'many', ['two', 'x']),
+    ],
+)
+def test_a_command_of_a_package_goes_by_the_name_of_its_entry_point(functions, called, words):
+    package = typer.Typer()
+    for name in functions:
+        package.command(name)(lambda word: print(word))
+    command = _added(called, package)
+    assert command.name == called
+    told = io.StringIO()
+    with redirect_stdout(told):
+        command.main(words, standalone_mode=False)
+    assert told.getvalue() == 'x\n'
 
 
 def test_compiling_shows_a_bar_with_a_clock_on_a_terminal(monkeypatch):

@@ -23,11 +23,13 @@ import glider_bringup as glider
 from glider_base import wiring
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.settings import ConfigurationError
-from glider_base.signals import TICK_NS
+from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.cli import app
+from glider_bringup.engines.direct import fly
+from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
-from glider_mission.blocks import BLOCKS
+from glider_mission.blocks import BLOCKS, COLUMNS, ROW
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.node_settings import read_settings
@@ -38,6 +40,7 @@ from glider_mission.recording.ros.verify.free_running import _by_stamp, free_run
 from glider_mission.recording.ros.verify.lockstep import place_ticks
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
+from glider_navigation.block import NAVIGATION
 
 PER_TICK = {t.full_name('/glider'): t for t in recorded_topics(['measured_odom']) if t.per_tick}
 BLOCK_OF = {
@@ -597,6 +600,19 @@ def test_stamps_alone_name_the_tick():
         wrong[place] ^= 1 << 33
         assert list(place_ticks(wrong)) == list(range(8))
     assert list(place_ticks(np.delete(stamps, 3))) == [0, 1, 2, 4, 5, 6, 7]
+
+
+@pytest.mark.parametrize('method', ['known', 'dead_reckoned'])
+def test_a_sensor_that_is_not_fitted_shows_the_same_to_every_engine(method):
+    """A method that looks at what it does not read, too, flies the same bits by all of them."""
+    scenario = load_scenario('current_8deg', {'navigation.method': method})
+    state, params = mission_of(scenario)
+    log = np.zeros((20, ROW))
+    state, _, _ = fly(state, params, log, TICK_S)
+    navigation = RecordedBlock(NAVIGATION, scenario.navigation_settings())
+    inputs = {name: log[:, COLUMNS[name]] for name in navigation.inputs}
+    navigation.run(np.arange(20) * TICK_NS, inputs)
+    assert navigation.state.intake == state.navigation.intake
 
 
 # ---------------------------------------------------------------------- the command

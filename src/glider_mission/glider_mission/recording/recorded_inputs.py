@@ -13,7 +13,7 @@ from glider_base.kernel import kernel
 from glider_base.kernels.packing import put
 from glider_base.settings import Settings
 from glider_base.signals import TICK_NS, TICK_S
-from glider_base.wiring import FIELDS, at_rest, present
+from glider_base.wiring import FIELDS, not_fitted, present
 from glider_model.plant.block import PLANT, plant_move, plant_outputs
 
 
@@ -88,7 +88,7 @@ class RecordedBlock:
         widths = {name: len(FIELDS[name]) for name in wired.outputs}
         table = np.empty((len(stamps_ns), sum(widths.values()) + len(self.block.flags)))
         absent = set(wired.inputs).difference(self.inputs)
-        inputs = inputs | {name: np.tile(at_rest(name), (len(table), 1)) for name in absent}
+        inputs = inputs | {name: np.tile(not_fitted(name), (len(table), 1)) for name in absent}
         rows = tuple(np.ascontiguousarray(inputs[name]) for name in wired.inputs)
         if self.block is PLANT:
             self.state = _move(self.state, self.params, rows, table, TICK_S)

@@ -19,7 +19,7 @@ from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.parameters import changed_parameters, declare_settings
 from glider_base.settings import Settings
 from glider_base.signals import TICK_NS, TICK_S, at_tick, raised
-from glider_base.wiring import at_rest, present
+from glider_base.wiring import at_rest, not_fitted, present
 
 RCLError = rclpy_implementation.RCLError
 
@@ -53,7 +53,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         self.sent = [block.wired.outputs.index(topic) for topic in outputs]
         #: what stands for inputs that there are not
         self.absent = [
-            (i, at_rest(topic))
+            (i, not_fitted(topic))
             for i, topic in enumerate(block.wired.inputs)
             if topic not in present(block.wired.inputs, topics)
         ]
