@@ -90,8 +90,11 @@ def default(stub: Callable) -> Callable:
     return stub
 
 
-def returns(*what: str) -> Callable:
-    """Have a slot refuse bodies that return less or more than so much: written under ``@slot``."""
+def returns(*what: str | type) -> Callable:
+    """Have a slot refuse bodies that return other than so many things: written under ``@slot``.
+
+    Each is said in words, or is the NamedTuple of numbers that it has to be.
+    """
 
     def mark(stub: Callable) -> Callable:
         stub.returns = what
@@ -126,11 +129,25 @@ def checked(kernel: Callable, *what: str) -> Callable:
     return call
 
 
-def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
+def _is_usable(kind: Any, what: str | type) -> bool:
+    """Whether compiled code can take what is returned for what: numbers, and tuples of them."""
+    if isinstance(what, type):
+        return getattr(kind, 'instance_class', None) is what and _is_numbers(kind)
+    return isinstance(kind, types.Number | types.Boolean | types.BaseTuple | types.Array)
+
+
+def _is_numbers(kind: Any) -> bool:
+    if isinstance(kind, types.BaseTuple):
+        return all(map(_is_numbers, kind))
+    return isinstance(kind, types.Number | types.Boolean)
+
+
+def _check(kernel: Any, kinds: tuple, what: tuple[str | type, ...]) -> None:
     """Refuse a kernel that is not compiled for arguments of these types, or returns other things.
 
     A ConfigurationError says so in one sentence, with its name and file.
     """
+    names = [getattr(one, '__name__', one) for one in what]
     try:
         call = types.Dispatcher(kernel).get_call_type(kernel.typingctx, kinds, {})
         returned = call.return_type
@@ -141,24 +158,26 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str, ...]) -> None:
         elif len(returned) != len(what):
             why = f'returns {len(returned)} values'
         else:
-            usable = types.Number, types.Boolean, types.BaseTuple, types.Array
-            odd = (i for i, kind in enumerate(returned) if not isinstance(kind, usable))
+            odd = (i for i, kind in enumerate(returned) if not _is_usable(kind, what[i]))
             if (i := next(odd, None)) is not None:
-                why = f'returns {returned[i]} as {what[i]}'
-            elif 'state' in what[0] and not kernel.typingctx.unify_types(kinds[0], returned[0]):
-                why = f'returns {returned[0]} as {what[0]}, which was {kinds[0]}'
+                why = f'returns {returned[i]} as {names[i]}'
+            elif 'state' in names[0] and not kernel.typingctx.unify_types(kinds[0], returned[0]):
+                why = f'returns {returned[0]} as {names[0]}, which was {kinds[0]}'
             else:
                 return
-    except NOT_COMPILED as error:
+    except ConfigurationError:
+        raise
+    except Exception as error:  # it is not our code, and numba lets through what it stumbles over
         why = f'cannot be compiled: {reason(error)}'
     code = kernel.py_func.__code__
     raise ConfigurationError(
         f'{code.co_name} ({code.co_filename}, line {code.co_firstlineno}): {why} (allowed: on any '
-        f'way returns {len(what)}: {", ".join(what)}; numbers keep their type, 0.0 for a float)'
+        f'way returns {len(what)}: {", ".join(names)}; numbers keep their type, 0.0 for a float)'
     )
 
 
 def reason(error: Exception) -> str:
     """The innermost of what numba says, in a line."""
     text = re.sub(r'\x1b\[\d+m', '', str(error)).partition('During:')[0]
-    return re.split(r'pipeline \(step: [^)]*\)', text)[-1].strip().partition('\n')[0]
+    text = re.split(r'pipeline \(step: [^)]*\)', text)[-1].strip().partition('\n')[0]
+    return text or type(error).__name__

@@ -37,8 +37,10 @@ from glider_bringup import console
 from glider_bringup.cli import OF_THE_SCRIPT, _added, app
 from glider_bringup.door.export import write_mat
 from glider_bringup.door.run import chosen_scenario
+from glider_guidance.method import Asked
 from glider_guidance.method import method_step as guidance_step
 from glider_model.ocean.field import field_velocity
+from glider_navigation.block import say
 from glider_navigation.method import method_step as navigation_step
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
@@ -751,6 +753,56 @@ def test_method_that_returns_nothing_somewhere_is_told(call, what):
         glider.ConfigurationError, match=rf'sometimes \(.*test_door.*nothing.*{what}'
     ):
         tick(Params(0.0))
+
+
+@kernel
+def number(at):
+    return at
+
+
+@kernel
+def bare_tuple(at):
+    return at, 0.0, at, 0.0, 0.0, True
+
+
+@kernel
+def text_within(at):
+    return Asked('north', 0.0, at, 0.0, 0.0, True)
+
+
+@kernel
+def too_few(at):
+    return Asked(at, 0.0, at)
+
+
+@pytest.mark.parametrize(
+    ('made', 'words'),
+    [
+        (number, 'returns float64 as Asked'),
+        (bare_tuple, r'returns Tuple\(.*as Asked'),
+        (text_within, r'returns Asked\(.*as Asked'),
+        (too_few, "Asked'>': missing a required argument: 'current_n'"),
+    ],
+)
+def test_method_that_asks_for_something_else_is_told(made, words):
+    class Params(NamedTuple):
+        at: float
+
+    @guidance_step.body(Params)
+    @kernel
+    def other(state, seen, params, dt):
+        return state, made(params.at)
+
+    @kernel
+    def tick(params):
+        return guidance_step(0.0, 0.0, params, 0.1)
+
+    with pytest.raises(glider.ConfigurationError, match=rf'other \(.*test_door.*{words}'):
+        tick(Params(0.0))
+
+
+def test_phase_of_another_package_has_a_number():
+    assert (say(3, 0).message, say(77, 0).message) == ('fixed', 'phase 77')
 
 
 def test_depth_is_drawn_downward_and_nothing_else(data):

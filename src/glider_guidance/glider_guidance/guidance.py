@@ -451,7 +451,7 @@ def refer(state, place, doing, asked, aborted, params, dt):
         theta_dot=pitch.rate,
         psi_dot=heading.rate,
     )
-    return Commanded(heading, pitch, asked.heading), state.s + dt * s_rate, reference
+    return Commanded(heading, pitch, float(asked.heading)), state.s + dt * s_rate, reference
 
 
 @kernel
@@ -512,7 +512,7 @@ def guidance_step(
         profile=profile,
         s=s,
         followed=followed,
-        water=WaterState(water.observer, asked.speed),
+        water=WaterState(water.observer, float(asked.speed)),
         method=method if gate.seen else state.method,
         commanded=commanded,
         infeasible_ticks=infeasible_ticks,

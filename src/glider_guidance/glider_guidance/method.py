@@ -104,7 +104,7 @@ class Asked(NamedTuple):
 
 
 @slot
-@returns('state after the tick', 'Asked')
+@returns('state after the tick', Asked)
 def method_step(state, seen, params, dt):
     """One tick of a guidance method, of ``dt`` s, by the type of its params.
 

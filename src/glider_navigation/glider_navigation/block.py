@@ -73,11 +73,13 @@ def navigation_tick(state, t_s, inputs, params, dt):
 
 def say(phase: int, refused: int) -> Said:
     """Where the vehicle is between two fixes, and whether a sensor is refused."""
-    values = {'phase': PHASE_NAMES[phase], 'refused': str(bool(refused)).lower()}
+    # a method of another package may have phases of its own
+    name = PHASE_NAMES[phase] if phase in range(len(PHASE_NAMES)) else f'phase {phase}'
+    values = {'phase': name, 'refused': str(bool(refused)).lower()}
     if refused:
-        message = f'{PHASE_NAMES[phase]}; refused a measurement, the last good one serves'
+        message = f'{name}; refused a measurement, the last good one serves'
         return Said('warn', message, values)
-    return Said('ok', PHASE_NAMES[phase], values)
+    return Said('ok', name, values)
 
 
 NAVIGATION = Block(

@@ -92,7 +92,7 @@ NONE = Covariance(0.0, 0.0, 0.0)
 
 
 @slot
-@returns('state after the tick', 'Estimate')
+@returns('state after the tick', Estimate)
 def method_step(state, received, params, dt):
     """One tick of a navigation method, of ``dt`` s, by the type of its params.
 

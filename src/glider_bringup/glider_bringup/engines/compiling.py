@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from glider_base.errors import ConfigurationError
+from glider_base.errors import MAX_LINE, ConfigurationError
 from glider_base.kernel import on_compiling
 from glider_base.signals import TICK_S
 from glider_base.slot import NOT_COMPILED, reason
@@ -41,8 +41,8 @@ def shown_once(combination: Combination, tell: Tell) -> Iterator[None]:
             yield
     except NOT_COMPILED as error:
         raise ConfigurationError(
-            f'law {law} with method {method}: cannot be compiled: {reason(error)} (allowed: roll '
-            'and pitch moment of a function; numbers that keep their type, 0.0 for a float)'
+            f'law {law} with method {method}: cannot be compiled: {reason(error)[:MAX_LINE]} '
+            '(allowed: numbers that keep their type, 0.0 for a float)'
         ) from None
 
 

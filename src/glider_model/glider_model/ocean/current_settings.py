@@ -17,6 +17,7 @@ from pydantic import Field
 from glider_base import plugins
 from glider_base.noise import random_stream
 from glider_base.settings import Settings, named, number
+from glider_base.slot import usable
 from glider_model.ocean import current, fields
 from glider_model.ocean.columns import MAX_DEPTH_M, MAX_ROWS, check_rows, read_columns
 from glider_model.ocean.current import CurrentParams, CurrentState, current_initial
@@ -411,6 +412,7 @@ class SumOfCurrents(_Flow):
             else:
                 first[i], last[i] = row, row + len(part.rows)
                 row = last[i]
+        field = self.field.params() if self.field else NoField()
         return CurrentParams(
             kind=kind,
             numbers=numbers,
@@ -418,7 +420,7 @@ class SumOfCurrents(_Flow):
             last=last,
             stream=stream,
             table=np.array(table, dtype=float).reshape(-1, 4),
-            field=self.field.params() if self.field else NoField(),
+            field=usable(field, 'current.field: params'),
         )
 
 
