@@ -174,6 +174,15 @@ def test_trim_prints_the_steady_glide():
     assert glide['glide_deg'] == pytest.approx(-31.6, abs=0.3)
 
 
+def test_trim_prints_the_same_numbers_to_a_person_and_to_a_program():
+    words = ['trim', 'slocum_g2', '--net-heaviness-kg', 0.2, '--pitch-deg', -25, '--fin-deg', 10]
+    table = glider(*words).stdout
+    numbers = json.loads(glider(*words, '--json').stdout)
+    assert 'fin_turn_rate' in numbers
+    for name in numbers.keys() - {'steering', 'coefficients', 'converged'}:
+        assert re.search(rf'{name} +│ {re.escape(format(numbers[name], ".5g"))} ', table)
+
+
 MISTAKES = [
     (['run', 'nowhere'], ["'nowhere'", 'current_8deg']),
     (['run', 'nowhere.yaml'], ['nowhere.yaml', 'no such']),

@@ -21,6 +21,7 @@ from glider_base.settings import ConfigurationError
 from glider_bringup import cli
 from glider_bringup.scoring.one_hertz import Record, Rows
 from glider_mission.changes import parse_assignment
+from glider_mission.disk import DiskError
 from glider_mission.planned import horizontal_speed
 from glider_mission.run_folder import make_result_folder
 from glider_mission.scenario import load_scenario
@@ -489,6 +490,26 @@ def test_a_failed_verdict_is_exit_code_one(tmp_path, monkeypatch):
         options = ['--only', 'paths', '--json', '--out', str(out)]
         assert CliRunner().invoke(cli.app, ['experiments', *options]).exit_code == code
         assert (out / RESULT_FILE).is_file()
+
+
+def test_a_disk_that_is_full_takes_no_result(tmp_path, monkeypatch):
+    from typer.testing import CliRunner
+
+    def full(path, text):
+        raise DiskError(f'{path}: cannot be written: No space left on device')
+
+    one = Experiment('paths', 'helix', '', 'made up', 'not flown', [], judge_limits({}))
+    monkeypatch.setattr(experiments, 'make_experiments', lambda groups: [one])
+    monkeypatch.setattr(experiments, 'fly', lambda *a: ([[made_up()]], [[]]))
+    studies = {'experiments': ['--only', 'paths'], 'montecarlo': ['--plants', '1']}
+    studies['montecarlo'] += ['--controller', 'pid', '--duration', '10', '--workers', '1']
+    for study, options in studies.items():
+        monkeypatch.setattr(f'glider_studies.commands.{study}.write_whole', full)
+        done = CliRunner().invoke(
+            cli.app, [study, *options, '--json', '--out', str(tmp_path / study)]
+        )
+        assert isinstance(done.exception, DiskError)
+        assert json.loads(done.stdout)
 
 
 def test_interrupt_ends_the_command(tmp_path):

@@ -13,7 +13,7 @@ from glider_base.errors import EXIT_FAILED
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import Json, changed_fields, messages, print_table
 from glider_mission.changes import split_changes
-from glider_model.plant.trim import Trim, solve_trim
+from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.coefficients import LIFT_AND_DRAG
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 
@@ -59,21 +59,21 @@ def trim(
         'steering': changed.steering_rates._asdict(),
         'coefficients': {name: getattr(params, name) for name in LIFT_AND_DRAG},
     }
+    numbers = asdict(solution)
+    turn, sine = solution.turn_rate_radps, math.sin(math.radians(solution.fin_deg))
+    if turn and sine and not solution.roll_mass_deg:
+        numbers['fin_turn_rate'] = turn / (sine * solution.speed_mps**2)
     if as_json:
-        print(json.dumps(asdict(solution) | of_vehicle))
+        print(json.dumps(numbers | of_vehicle))
     else:
-        _print_trim(vehicle, solution, of_vehicle)
+        _print_trim(vehicle, numbers, of_vehicle)
     if not solution.converged:
         messages.print("no steady state found within the vehicle's ranges", style='red')
         raise typer.Exit(EXIT_FAILED)
 
 
-def _print_trim(vehicle: str, solution: Trim, of_vehicle: dict[str, dict[str, float]]) -> None:
+def _print_trim(vehicle: str, rows: dict, of_vehicle: dict[str, dict[str, float]]) -> None:
     """Print a solution, and what follows from the vehicle's file whatever the glide."""
-    rows = asdict(solution)
-    turn, sine = solution.turn_rate_radps, math.sin(math.radians(solution.fin_deg))
-    if turn and sine and not solution.roll_mass_deg:
-        rows['fin_turn_rate'] = turn / (sine * solution.speed_mps**2)
     for group, numbers in of_vehicle.items():
         rows |= {f'{group} {name}': number for name, number in numbers.items()}
     texts = (

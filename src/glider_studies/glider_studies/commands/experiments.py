@@ -76,15 +76,15 @@ def experiments(
         if isinstance(counts, dict) and counts:
             entry['counts'] = counts
             result |= counts
-    if out:
+    if as_json:
+        print(json.dumps(result))
+    else:
+        tables.show(result, output)
+    if out:  # last: a disk that is full must not take what was flown
         write_whole(out / paper.RESULT_FILE, json.dumps(result, indent=2) + '\n')
         with messages.status('drawing'):
             drawn = paper_figures.draw(planned, rows, records, out)
         for file in drawn:
             messages.print(f'drawn: {file}', soft_wrap=True)
-    if as_json:
-        print(json.dumps(result))
-    else:
-        tables.show(result, output)
     if any(one['verdict'] == paper.FAILED for one in result['experiments']):
         raise typer.Exit(EXIT_FAILED)

@@ -83,12 +83,12 @@ def montecarlo(
     with workers_at_work(workers, scheduler, loops, len(scenarios)) as (pool, update):
         flights, airframes = study.fly_plants(scenarios, pool, update)
     whole = study.report(scenario, fields, seed, faults, flights, airframes)
-    if out:
-        write_whole(out / study.RESULT_FILE, json.dumps(whole, indent=2) + '\n')
     if as_json:
         print(json.dumps({name: value for name, value in whole.items() if name != 'flown'}))
     else:
         _print_study(whole)
+    if out:  # last: a disk that is full must not take what was flown
+        write_whole(out / study.RESULT_FILE, json.dumps(whole, indent=2) + '\n')
 
 
 def _print_study(study: dict) -> None:
