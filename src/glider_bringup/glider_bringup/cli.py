@@ -112,7 +112,7 @@ def _command(name: str, found: typer.Typer) -> typer.core.TyperCommand:
     """Command of an application by its name: of this name, the only one, or all of them."""
     group = typer.main.get_group(found)
     alone = len(group.commands) == len(found.registered_commands) == 1
-    only = next(iter(group.commands.values())) if alone and not found.registered_callback else group
+    only = [*group.commands.values()][0] if alone and not found.registered_callback else group
     command = group.commands.get(name, only)
     command.name = name
     return command
