@@ -379,6 +379,13 @@ def test_mistake_is_told(call, text, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
 
 
+def test_law_of_a_program_is_not_swept_for_workers_do_not_know_it():
+    chosen_scenario('helix', None, None, level, None, None, None)
+    for axes in ({'control.law': ['pid', 'level']}, SPEEDS):
+        with pytest.raises(ConfigurationError, match="law = 'level': of this program alone"):
+            glider.sweep(axes, set={} if 'control.law' in axes else {'control.law': 'level'})
+
+
 def test_value_of_an_axis_that_is_none_is_told_in_a_line():
     with pytest.raises(ConfigurationError) as error:
         glider.sweep({'current.speed_kn': [0.0, float('nan')]})

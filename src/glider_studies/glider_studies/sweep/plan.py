@@ -267,6 +267,11 @@ class Plan:
             raise ConfigurationError(f'{path}: {error}') from None
         # every value of every dimension, the first cell's first
         checked = [one for number in range(len(self.axes)) for one in self.along(number)]
+        if own := next((one.control.law for one in checked if type(one) is not Scenario), None):
+            raise ConfigurationError(
+                f'{path}: control.law = {own!r}: of this program alone, workers do not know it '
+                '(allowed: one of the stack or of a package: docs/your_law.md)'
+            )
         #: digests of the scenarios of all values
         self.scenarios = []
         for one in checked:  # whose vehicle has no folder
