@@ -11,7 +11,6 @@ import signal
 import sys
 from functools import partial
 from importlib import import_module
-from importlib.util import find_spec
 
 gc.set_threshold(100_000)  # what is imported stays: no use in looking through it again
 
@@ -187,13 +186,10 @@ def main() -> int:
     except ModuleNotFoundError as error:
         if not _OF_ROS.match(error.name or ''):
             raise
-        if find_spec('rclpy'):
-            _tell(f'no module {error.name}: ROS 2 is there, this package of it is not')
-        else:
-            _tell(
-                f'ROS 2 Jazzy is not there (no module {error.name}), which nodes and bags need; '
-                'glider run --engine direct flies without it'
-            )
+        _tell(
+            f'no module {error.name}: ROS 2 Jazzy, or this package of it, is not there; nodes and '
+            'bags need ROS, glider run --engine direct flies without it'
+        )
         code = EXIT_USAGE
     except OSError as error:
         _tell(f'{error.filename or "input or output"}: {error.strerror or error}'[:MAX_LINE])
