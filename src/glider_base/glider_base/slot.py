@@ -160,7 +160,8 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str | type, ...]) -> None:
         else:
             odd = (i for i, kind in enumerate(returned) if not _is_usable(kind, what[i]))
             if (i := next(odd, None)) is not None:
-                why = f'returns {returned[i]} as {names[i]}'
+                kind = str(returned[i]).replace('unicode_type', 'str')
+                why = f'returns {kind} as {names[i]}'
             elif 'state' in names[0] and not kernel.typingctx.unify_types(kinds[0], returned[0]):
                 why = f'returns {returned[0]} as {names[0]}, which was {kinds[0]}'
             else:

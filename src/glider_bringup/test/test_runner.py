@@ -300,15 +300,15 @@ def test_domains_that_another_person_had_are_free(monkeypatch):
                 pass
         os.umask(umask)
         monkeypatch.delenv('ROS_DOMAIN_ID')
-        child = os.fork()
-        if not child:
-            try:
-                os.setuid(65534)
-                with domain_id():
-                    os._exit(7)
-            finally:
-                os._exit(1)
-        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+        program = (
+            'import os, tempfile\n'
+            'from glider_base.ros.places import domain_id\n'
+            f'tempfile.tempdir = {folder!r}\n'
+            'os.setuid(65534)\n'
+            'with domain_id():\n'
+            '    pass\n'
+        )
+        subprocess.run(python(program), check=True)
 
 
 def test_domain_of_the_user_is_kept(monkeypatch):
