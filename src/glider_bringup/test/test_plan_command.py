@@ -3,6 +3,7 @@
 """``./glider plan``, and flights on a planned route: orders that are kept and flown again."""
 
 import json
+import re
 
 import matplotlib.image
 import numpy as np
@@ -110,6 +111,13 @@ def test_a_plan_tells_time_and_energy_of_a_flight_that_surfaces_and_of_one_that_
     assert made.wh == pytest.approx(run.score['energy']['wh'], rel=0.15)
     surfacings = np.sum(np.diff(run.to_xarray().ground_truth_odom_depth.values < 1.5) > 0) // 2
     assert planning._report(made, scenario)['surfacings'] == pytest.approx(surfacings, rel=0.15)
+
+
+def test_a_path_in_depth_is_no_plan_and_what_would_be_one_is_named():
+    with pytest.raises(ConfigurationError, match='profile.mode = path') as error:
+        planned(load_scenario('survey', {'profile.mode': 'path'}))
+    (allowed,) = re.findall(r'\(allowed: (\w+)\)', str(error.value))
+    assert planned(load_scenario('survey', {'profile.mode': allowed})).reachable
 
 
 @pytest.mark.parametrize('rise', [0.001, 0.002, 0.003])

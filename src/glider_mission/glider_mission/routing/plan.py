@@ -356,7 +356,7 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
             'path.kind = helix: no legs to be planned (allowed: straight, waypoints, spline)'
         )
     if scenario.profile.mode == 'path':
-        raise ConfigurationError('profile.mode = path: no dives to be planned (allowed: yo)')
+        raise ConfigurationError('profile.mode = path: no dives to be planned (allowed: profile)')
     scenario = as_dived(scenario)
     pace, end_s = pace_of(scenario), scenario.duration_s
     forecast = forecast_of(scenario, pace.stay)
