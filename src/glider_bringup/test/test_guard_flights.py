@@ -437,7 +437,7 @@ def test_who_is_fouled_until_it_hangs_in_its_dive_comes_up():
 
 
 def test_who_is_too_light_for_the_water_at_its_depth_comes_up():
-    """Led out of one stall after the other it went between 63 and 100 m to the end of its run."""
+    """Led out of one stall after the other it went up and down to the end of its run."""
     flown = fly('slocum_shelf', 5000.0, **{'water.pycnocline_rise': 0.0045})
     assert flown.depth.max() > 90.0 and flown.depth[-1] < AT_SURFACE_M
 

@@ -29,6 +29,7 @@ LEVEL = (0.0, 0.0, -50.0, 1.0, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)
 #: Covariance of the place that navigation believes (m^2).
 CERTAIN = (1.0, 0.0, 0.0, 1.0)
 INPUTS = {'odom': (*LEVEL, *CERTAIN), 'joint_states': (0.4, 0.0, 0.0), 'reference': LEVEL}
+DEMAND = (0.4, 0.0, 0.0)
 DEADLINE_S = 200.0
 #: The mass holds it level: the pump of this vehicle does not move, and nobody sees it rise.
 SAFE = (GuardSettings().params().ascent.safe.m_b, 0.0, 0.0)
@@ -97,6 +98,48 @@ class Flight:
         self.vehicle.node.destroy_node()
 
 
+class ByHand:
+    """A guard whose time, cycles and inputs are made by hand: no pause of the machine counts."""
+
+    def __init__(self, context, monkeypatch, **parameters) -> None:
+        given = {'lockstep': False, **parameters}
+        overrides = [Parameter(name, value=value) for name, value in given.items()]
+        self.guard = GuardNode(context=context, parameter_overrides=overrides)
+        self.now_s, self.said, self.sent = 100.0, [], {'command': [], 'drop_weight': []}
+        monkeypatch.setattr(self.guard, 'now_s', lambda: self.now_s)
+        monkeypatch.setattr(
+            self.guard, 'event', lambda stamp_ns, level, message, **_: self.said.append(message)
+        )
+        self.guard.senders = [
+            lambda stamp_ns, values, sent=sent: sent.append((self.now_s, *values))
+            for sent in self.sent.values()
+        ]
+
+    def cycle(self, says, s: float = 0.1) -> None:
+        """What is said comes, and a cycle follows, so much later (s)."""
+        self.now_s += s
+        stamp_ns = round(self.now_s * 10) * TICK_NS
+        for item in self.guard.inputs:
+            if item.topic.name in says:
+                raw = item.topic.codec.encode(stamp_ns, says[item.topic.name])
+                item.accept_newest(raw, self.now_s, 1.0)
+        self.guard._on_cycle()
+
+
+@pytest.fixture
+def by_hand(context, monkeypatch):
+    made = []
+
+    def make(**parameters) -> ByHand:
+        made.append(ByHand(context, monkeypatch, **parameters))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.guard.close()
+        one.guard.destroy_node()
+
+
 @pytest.fixture
 def flight(context):
     flight = Flight(context)
@@ -161,41 +204,25 @@ def test_nothing_is_cleared_while_nobody_knows_how_deep_the_vehicle_is(context, 
     ],
 )
 def test_the_weight_goes_where_input_is_lost_and_nothing_shows_it_up(
-    context, monkeypatch, depth_m, comes, goes
+    by_hand, depth_m, comes, goes
 ):
-    free = [Parameter('lockstep', value=False), Parameter('drop_blind_s', value=600.0)]
-    guard, time_s, sent = GuardNode(context=context, parameter_overrides=free), [100.0], []
-    monkeypatch.setattr(guard, 'now_s', lambda: time_s[0])
-    guard.senders[1] = lambda stamp_ns, values: sent.append((time_s[0], *values))
-    says = dict(INPUTS, odom=(0.0, 0.0, -depth_m, *INPUTS['odom'][3:]), demand=(0.4, 0.0, 0.0))
-
-    def cycle(names, **more) -> None:
-        time_s[0] += 0.5
-        for item in guard.inputs:
-            name, stamp_ns = item.topic.name, round(time_s[0] * 10) * TICK_NS
-            if name in names:
-                values = more.get(name, says.get(name, at_rest(name)))
-                item.accept_newest(item.topic.codec.encode(stamp_ns, values), time_s[0], 1.0)
-        guard._on_cycle()
-
-    try:
-        for _ in range(20):
-            cycle([*says])
-        lost_s = time_s[0]
-        more = {'health': (0.0, -1.0, 0.0)} if 'contact' in comes else {}
-        if 'up' in comes:
-            comes, more = [*comes, 'odom'], {'odom': (0.0, 0.0, -0.5, *says['odom'][3:])}
-        while time_s[0] < lost_s + 1200.0:
-            cycle([*comes, *more], **more)
-        dropped = [at_s - lost_s for at_s, says_so in sent if says_so]
-        assert bool(dropped) == goes
-        if goes:  # 600 s, and the way up at climb_mps
-            assert dropped[0] == pytest.approx(600.0 + 50.0 / 0.15, abs=20.0)
-            cycle([*says])
-            assert sent[-1][1] == 0.0  # what is to be seen again decides
-    finally:
-        guard.close()
-        guard.destroy_node()
+    flight = by_hand(drop_blind_s=600.0)
+    odom = {at_m: (0.0, 0.0, -at_m, *INPUTS['odom'][3:]) for at_m in (depth_m, 0.5)}
+    says = {**INPUTS, 'odom': odom[depth_m], 'demand': DEMAND}
+    for _ in range(20):
+        flight.cycle(says, 0.5)
+    lost_s = flight.now_s
+    may = {**says, 'up': odom[0.5], 'contact': (0.0, -1.0, 0.0)}
+    names = {'up': 'odom', 'contact': 'health'}
+    while flight.now_s < lost_s + 1200.0:
+        flight.cycle({names.get(name, name): may[name] for name in comes}, 0.5)
+    dropped = [at_s - lost_s for at_s, says_so in flight.sent['drop_weight'] if says_so]
+    assert bool(dropped) == goes
+    if goes:  # 600 s, and the way up at climb_mps
+        assert dropped[0] == pytest.approx(600.0 + 50.0 / 0.15, abs=20.0)
+        assert sum('the weight is let go' in said for said in flight.said) == 1
+        flight.cycle(says, 0.5)
+        assert flight.sent['drop_weight'][-1][1] == 0.0  # what is to be seen again decides
 
 
 def test_what_comes_with_a_stamp_that_stands_still_is_told_from_what_does_not_come(flight):
@@ -223,18 +250,23 @@ def test_control_that_is_configured_again_counts_anew_what_it_refuses(context):
 
 
 @pytest.mark.parametrize('heard', [True, False])
-def test_a_clock_that_is_set_forward_is_no_lost_input(flight, monkeypatch, heard):
+def test_a_clock_that_is_set_forward_is_no_lost_input(by_hand, heard):
     """Nor is it that this node was stopped; and who is silent has the time that he has."""
-    vehicle, now_s = flight.vehicle, flight.guard.now_s
+    flight = by_hand(input_max_age_s=0.5, lost_after_s=1.0)
+    says, commands = {**INPUTS, 'demand': DEMAND}, flight.sent['command']
+    for _ in range(20):
+        flight.cycle(says)
     if not heard:
-        vehicle.says = {}
-        flight.until(lambda: vehicle.said('missing or stale'))
-    before = len(vehicle.commands)
-    monkeypatch.setattr(flight.guard, 'now_s', lambda: now_s() + 3600.0)
-    flight.guard._on_cycle()  # before anything comes
-    flight.until(lambda: len(vehicle.commands) > before + 4)
-    assert not vehicle.said('for good')
-    assert not heard or SAFE not in vehicle.commands[before:]
+        says = {}
+        while not any('missing or stale' in said for said in flight.said):
+            flight.cycle(says)
+    before = len(commands)
+    flight.cycle({}, 3600.0)  # before anything comes
+    for _ in range(4):
+        flight.cycle(says)
+    assert len(commands) > before + 4
+    assert not any('for good' in said for said in flight.said)
+    assert not heard or SAFE not in [command[1:4] for command in commands[before:]]
 
 
 def test_who_commands_beside_the_guard_is_named(flight):

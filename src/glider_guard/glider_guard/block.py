@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The guard as a block."""
 
+import math
+from collections.abc import Mapping
+
 from glider_base.block import Block, Said, block_tick
 from glider_base.frames import covariance_from_wire, odometry_from_wire
 from glider_base.kernel import kernel, replace
@@ -11,6 +14,7 @@ from glider_guard.guard import INITIAL_GUARD, GuardParams, Received, guard_step
 from glider_guard.rows import HOLD, ORDERED, REACTIONS, reaction_of
 from glider_guard.rows import say as said_of
 from glider_guard.settings import GuardSettings
+from glider_guard.witness import AFLOAT_M, HEARD_S
 from glider_model.ocean.density import depth_at
 from glider_model.vehicle.file import steers_by
 
@@ -52,6 +56,14 @@ def guard_tick(state, t_s, inputs, params, dt):
     state = replace(state, t_s=t_s)
     command = (out.command.m_b, out.command.x_p, out.command.mu, out.command.delta)
     return state, (command, (1.0 if out.drops else 0.0,)), (out.reported,)
+
+
+def is_seen_up(fresh: Mapping[str, tuple[float, ...]]) -> bool:
+    """Whether inputs that still come show a vehicle at the surface: by a depth, or a contact."""
+    depths = [depth_at(fresh['pressure'][0])] if 'pressure' in fresh else []
+    depths += [odometry_from_wire(fresh['odom']).p_d] if 'odom' in fresh else []
+    contact_age_s = fresh['health'][2] if 'health' in fresh else -1.0
+    return min(depths, default=math.inf) < AFLOAT_M or 0.0 <= contact_age_s < HEARD_S
 
 
 @kernel

@@ -245,10 +245,16 @@ def sound(state: Depths, at: Sounding, limits: DepthLimits, dt: float) -> Depths
 
 
 @kernel
+def late_s(drop_s, depth, limits):
+    """When who comes up from a depth (m) is late (s), ``drop_s`` beside the time of the way."""
+    return drop_s + depth / limits.climb_mps
+
+
+@kernel
 def _weight_goes(state, sees, floods, limits):
     """Whether a vehicle that surfaces for good does not, and never will, without its weight."""
     drop_s = limits.drop_after_s if sees else limits.drop_blind_s
-    is_late = state.up_s > drop_s + state.up_from / limits.climb_mps
+    is_late = state.up_s > late_s(drop_s, state.up_from, limits)
     sinks = sees and state.mean - state.least > SUNK_M
     is_flooded = sinks and (floods or state.least < SURFACE_M)
     is_flooded = is_flooded or (floods and not sees and state.up_s > 0.0)

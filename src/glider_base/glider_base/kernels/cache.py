@@ -238,10 +238,7 @@ class KernelCache(FunctionCache):
         else:
             target_context.refresh()
         found = None
-        with (
-            self._guard_against_spurious_io_errors(),
-            suppress(NotADirectoryError, PermissionError),
-        ):
+        with suppress(NotADirectoryError, PermissionError):  # which is said when it is to be kept
             found = self._load_overload(sig, target_context)
         if found is not None:
             path = self._cache_file._index_path

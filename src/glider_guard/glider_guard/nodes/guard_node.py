@@ -2,20 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The guard as a node: demand and all that is measured in; command and drop_weight out."""
 
-import math
 import sys
 
 from std_srvs.srv import Trigger
 
-from glider_base.frames import odometry_from_wire
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import entry
 from glider_base.signals import TICK_S, Joints
+from glider_base.wiring import at_rest
 from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
-from glider_guard.block import GUARD
-from glider_guard.witness import AFLOAT_M, HEARD_S, SURFACE_M
-from glider_model.ocean.density import depth_at
+from glider_guard.block import GUARD, is_seen_up
+from glider_guard.depth import late_s
+from glider_guard.witness import AFLOAT_M, SURFACE_M
 
 
 class GuardNode(BlockNode):
@@ -33,7 +32,6 @@ class GuardNode(BlockNode):
         """Know nothing, as at the start."""
         super().forget()
         self.stale_ticks, self.blind_ticks, self.ascent = 0, 0, INITIAL_ASCENT
-        self.drops = False
 
     def pause(self) -> None:
         """Act no more, until `begin`; nobody knows how deep it is then."""
@@ -73,6 +71,8 @@ class GuardNode(BlockNode):
         """Call every kernel once, so that no tick waits for the compiler."""
         super().compile_kernels()
         self._come_up()
+        self._drop_s()
+        is_seen_up({name: at_rest(name) for name in ('odom', 'pressure')})
 
     def _come_up(self, cycles: int = 1) -> Joints:
         """Command of a cycle, or of some at once, in which nothing is seen."""
@@ -85,7 +85,6 @@ class GuardNode(BlockNode):
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
         """Answer one tick."""
         self.stale_ticks, self.blind_ticks, self.ascent = 0, 0, INITIAL_ASCENT
-        self.drops = False
         super().step(stamp_ns, *inputs)
 
     def on_stale(self, stamp_ns: int, cycles: int) -> None:
@@ -100,29 +99,29 @@ class GuardNode(BlockNode):
             self.event(stamp_ns, health.ERROR, said)
         publish_command, publish_weight = self.senders
         publish_command(stamp_ns, self._come_up(cycles))
-        limits, last_m = self.params.depth, self.state.depths.depth
-        is_there = last_m > AFLOAT_M and 'joint_states' not in self._stale
-        self.blind_ticks = self.blind_ticks + cycles if is_there and not self._is_seen_up() else 0
-        drop_s = limits.drop_blind_s + last_m / limits.climb_mps
+        is_there = self.state.depths.depth > AFLOAT_M and 'joint_states' not in self._stale
+        is_blind = is_there and not is_seen_up(self._fresh())
+        before, self.blind_ticks = self.blind_ticks, is_blind * (self.blind_ticks + cycles)
+        drop_s = self._drop_s()
         if self.blind_ticks * TICK_S > drop_s:
-            if not self.drops:
+            if before * TICK_S <= drop_s:
                 said = f'input lost, not seen up for {drop_s:,.0f} s: the weight is let go'
                 self.event(stamp_ns, health.ERROR, said)
-            self.drops = True
             publish_weight(stamp_ns, (1.0,))
 
-    def _is_seen_up(self) -> bool:
-        """Whether a depth that still comes, or a contact, is that of a vehicle at the surface."""
+    def _drop_s(self) -> float:
+        """Time (s) without input within which it should be up from its last depth."""
+        limits = self.params.depth
+        return late_s(limits.drop_blind_s, self.state.depths.depth, limits)
+
+    def _fresh(self) -> dict[str, tuple[float, ...]]:
+        """Numbers of the inputs that are not old."""
         now_s = self.now_s()
-        fresh = {
+        return {
             item.topic.name: item.values
             for item in self.inputs
             if item.values and now_s - item.arrived_s <= self.max_age_s(item.topic.name)
         }
-        depths = [depth_at(fresh['pressure'][0])] if 'pressure' in fresh else []
-        depths += [odometry_from_wire(fresh['odom']).p_d] if 'odom' in fresh else []
-        contact_age_s = fresh['health'][2] if 'health' in fresh else -1.0
-        return min(depths, default=math.inf) < AFLOAT_M or 0.0 <= contact_age_s < HEARD_S
 
 
 main = entry(GuardNode)

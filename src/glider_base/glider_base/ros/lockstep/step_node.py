@@ -143,7 +143,8 @@ class StepNode(TickNode):
             else:
                 self.event(stamp_ns, health.OK, 'inputs are fresh again')
         if stale:
-            self.on_stale(stamp_ns, min(due, self._passing.most))
+            # in a longer pause nobody was silent
+            self.on_stale(stamp_ns, due if due <= self._passing.most else 1)
         elif not (passed := self._passing.ticks(stamp_ns)):
             self.repeat()
         else:
