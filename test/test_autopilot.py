@@ -165,6 +165,16 @@ def test_it_leaves_when_the_plant_gives_up(waiting):
     assert autopilot.process.wait(DEADLINE_S) == 0
 
 
+def refused(tmp_path, words, **more) -> str:
+    """What it says on standard error as it refuses to start."""
+    env = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ, **more}
+    process = command_line.Started(words, env, tmp_path, AUTOPILOT_MODULE)
+    _, error = process.communicate(DEADLINE_S)
+    assert process.returncode == 2
+    assert 'Traceback' not in error
+    return error
+
+
 @pytest.mark.parametrize(
     ('words', 'said'),
     [
@@ -182,15 +192,10 @@ def test_it_leaves_when_the_plant_gives_up(waiting):
         ),
     ],
 )
-def test_what_it_cannot_use_is_named(tmp_path, words, said, **more):
-    env = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', **os.environ, **more}
-    process = command_line.Started(words, env, tmp_path, AUTOPILOT_MODULE)
-    _, error = process.communicate(DEADLINE_S)
-    assert process.returncode == 2
-    assert f'fatal: {said}' in error
-    assert 'Traceback' not in error
+def test_what_it_cannot_use_is_named(tmp_path, words, said):
+    assert f'fatal: {said}' in refused(tmp_path, words)
 
 
 def test_a_folder_for_logs_that_cannot_be_made_is_named(tmp_path):
-    said = 'no folder for logs: failed to initialize logging'
-    test_what_it_cannot_use_is_named(tmp_path, [], said, ROS_HOME='/proc/none', ROS_LOG_DIR='')
+    error = refused(tmp_path, [], ROS_HOME='/proc/none', ROS_LOG_DIR='')
+    assert 'fatal: no folder for logs: failed to initialize logging' in error
