@@ -4,6 +4,7 @@
 
 import gc
 import signal
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -88,3 +89,15 @@ def context(monkeypatch):
         rclpy.try_shutdown(context=context)
     for number, handler in before.items():
         signal.signal(number, handler)
+    # Who is left has a part in the shared memory of flights that later tests kill in its domain.
+    gc.collect()
+    assert not _participants()
+
+
+def _participants() -> list[str]:
+    """Names of threads by which this process takes part in ROS domains."""
+    names = []
+    for path in Path('/proc/self/task').glob('*/comm'):
+        with suppress(OSError):  # it has ended
+            names.append(path.read_text(encoding='utf-8').strip())
+    return [name for name in names if name.startswith('dds.udp')]
