@@ -19,6 +19,9 @@ _NUMBERS = {
     **{types.int64: np.int64, types.uint64: np.uint64},
 }
 _ORDER = list(_NUMBERS)
+#: Types that need no look at the value, and of tuples by what is in them: numba takes long.
+_OF_PYTHON = {float: types.float64, bool: types.boolean}
+_kinds = {}
 #: LLVM schedules every two of so many numbers that it moves: a block of all is long to compile.
 FENCED = 32
 
@@ -30,18 +33,25 @@ def packed(values: tuple) -> tuple[types.Type, tuple[np.ndarray, ...], tuple]:
     """
     if numba.config.DISABLE_JIT:
         return values, (), ()
-    kind, numbers, others = numba.typeof(values), [[] for _ in _ORDER], []
-    _sort(kind, values, numbers, others)
+    parts, numbers, others = [], [[] for _ in _ORDER], []
+    _sort(values, parts, numbers, others)
+    parts = tuple(parts)
+    if parts not in _kinds:
+        _kinds[parts] = numba.typeof(values)
     arrays = (np.array(x, of) for x, of in zip(numbers, _NUMBERS.values(), strict=True))
-    return kind, tuple(arrays), tuple(others)
+    return _kinds[parts], tuple(arrays), tuple(others)
 
 
-def _sort(kind, value, numbers, others) -> None:
-    """Append numbers to the lists of their types, all else to the last one."""
-    if isinstance(kind, types.BaseTuple):
-        for one, inner in zip(kind.types, value, strict=True):
-            _sort(one, inner, numbers, others)
-    elif kind in _NUMBERS:
+def _sort(value, parts, numbers, others) -> None:
+    """Append numbers to the lists of their types, all else to the last one; and what each is."""
+    if isinstance(value, tuple):
+        parts += type(value), len(value)
+        for one in value:
+            _sort(one, parts, numbers, others)
+        return
+    kind = _OF_PYTHON.get(type(value)) or numba.typeof(value)
+    parts.append(kind)
+    if kind in _NUMBERS:
         numbers[_ORDER.index(kind)].append(value)
     else:
         others.append(value)
