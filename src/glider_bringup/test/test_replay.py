@@ -32,6 +32,7 @@ from glider_bringup.engines.processes import RECORDER, node_commands
 from glider_mission.recording.mcap_reader import Bag, BagTopic
 from glider_mission.recording.ros.recorded_log import RecordedLog
 from glider_mission.recording.ros.republish import plan_replay, qos_of
+from glider_mission.recording.ros.rosbag2 import BagWriter
 from glider_mission.scenario import load_scenario
 
 DEADLINE_S = 120.0
@@ -340,15 +341,24 @@ def test_loop_begins_again_with_the_recorded_stamps(
     assert listener.got['/clock'][:63] == 3 * once
 
 
+@pytest.mark.parametrize('by', ['others', 'our recorder'])
 def test_recording_without_clock_gets_one_by_its_log_times(
-    short_run, read_bag, write_bag, replay, listen, tmp_path
+    short_run, read_bag, write_bag, replay, listen, tmp_path, by
 ):
+    """Ours of free-running nodes has the topic, and no message of it."""
     (like,) = short_run.glob('*.mcap')
     kept = [m for m in read_bag(like) if m.topic == '/glider/odom' and m.log_ns < 3_000_000_000]
     moved = [m._replace(log_ns=m.log_ns + 1_700_000_000_000_000_000) for m in kept]
-    write_bag(tmp_path / 'vehicle.mcap', like, moved)
+    if by == 'others':
+        write_bag(tmp_path / 'vehicle_0.mcap', like, moved)
+    else:
+        bag = BagWriter(tmp_path, 'vehicle')
+        for message in moved:
+            bag.write('odom', message.log_ns, message.data)
+        bag.close()
     listener = listen('/glider/odom', '/clock')
-    process = replay(tmp_path / 'vehicle.mcap', '--rate', 'max', '--wait-for', 1)
+    options = ('--rate', 'max', '--topics', 'odom', '--wait-for', 1)
+    process = replay(tmp_path / 'vehicle_0.mcap', *options)
     listener.listen_until(lambda: len(listener.got['/glider/odom']) >= 30, process)
     assert process.wait(DEADLINE_S) == 0
     listener.listen_until(lambda: listener.got['/clock'], process)

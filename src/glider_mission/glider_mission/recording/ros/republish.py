@@ -56,6 +56,10 @@ class Plan(NamedTuple):
         inside = (batch.log_ns >= self.start_ns) & (batch.log_ns <= self.end_ns)
         return inside & np.isin(batch.topic, list(self.names))
 
+    def says(self, index: int) -> bool:
+        """Whether a topic has a message that is published."""
+        return any(np.any(batch.topic[self.has(batch)] == index) for batch in self.bag.batches())
+
 
 # ---------------------------------------------------------------------- what to replay
 
@@ -113,6 +117,8 @@ def plan_replay(
             f'nothing to replay: no message on {", ".join(plan.names.values()) or "any topic"} '
             f'from {begin_s:.1f} s to {end_s:.1f} s of the recording'
         )
+    for index in [i for i, name in plan.names.items() if name == '/clock' and not plan.says(i)]:
+        del plan.names[index]  # as of free-running nodes
     return plan
 
 
