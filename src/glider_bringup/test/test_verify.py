@@ -27,6 +27,7 @@ from glider_base.signals import TICK_NS, TICK_S
 from glider_bringup.cli import app
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
+from glider_bringup.engines.node_parameters import write_parameters
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_mission.blocks import BLOCKS, COLUMNS, ROW
@@ -34,6 +35,7 @@ from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.node_settings import read_settings
 from glider_mission.recording.ros.recorded_run import Recording, Series
+from glider_mission.recording.ros.verify import every_block
 from glider_mission.recording.ros.verify.check import IDENTICAL
 from glider_mission.recording.ros.verify.every_block import report, verify
 from glider_mission.recording.ros.verify.free_running import _by_stamp, free_running
@@ -406,6 +408,23 @@ def test_what_a_vehicle_need_not_say_is_not_missed_where_it_flies_freely(short_r
         said = given._replace(lockstep=lockstep)
         (guard,) = verify(recording, said, ['guard'], lambda name, share: None)
         assert (guard.result, why in guard.reason) == ('skipped', True)
+
+
+def test_after_a_silence_a_step_is_as_long_as_its_own_node_takes_it(
+    altered, beginning, tmp_path, monkeypatch
+):
+    """Up to the `input_max_age_s` that it was given, and not that of another."""
+    folder, taken = altered(beginning), {}
+    control = {'lockstep': False, 'input_max_age_s': 3.0}
+    write_parameters({'control_node': control}, folder / 'parameters.yaml')
+
+    def look(block, recording, max_age_s, progress):
+        taken[block.block.wired.name] = max_age_s
+        return free_running(block, recording, max_age_s, progress)
+
+    monkeypatch.setattr(every_block, 'free_running', look)
+    verified(folder, tmp_path)
+    assert taken == {'navigation': 1.0, 'guidance': 1.0, 'control': 3.0}
 
 
 @pytest.mark.parametrize('keep', [False, True])

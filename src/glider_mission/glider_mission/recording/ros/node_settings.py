@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The settings of the nodes of a recorded run, from wherever they stand."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,8 +25,12 @@ class NodeSettings(NamedTuple):
     blocks: dict[str, Settings | None]  #: by name of the block; None: it is not known
     source: str  #: where it stands
     lockstep: bool | None = None  #: None: it does not say
-    #: free-running: time (s) after which an input was old
-    max_age_s: float = OLD_S
+    #: free-running: time (s) after which an input was old, by node; of all others under ``'**'``
+    max_age_s: Mapping[str, float] = {}
+
+    def old_s(self, node: str) -> float:
+        """Time (s) after which an input of a node was old."""
+        return self.max_age_s.get(node, self.max_age_s.get('**', OLD_S))
 
     @property
     def steers_by(self) -> str:
@@ -77,15 +82,16 @@ def _sections(values: dict) -> dict[str, dict]:
     }
 
 
-def _how(values: dict) -> tuple[bool | None, float]:
+def _how(values: dict) -> tuple[bool | None, dict[str, float]]:
     """How the nodes of a parameter file act: whether in step, and when an input is old (s)."""
-    sections = _sections(values).values()
+    sections = _sections(values)
 
-    def of_all(name: str, kind: type) -> list:
-        return [one for section in sections if isinstance(one := section.get(name), kind)]
+    def of_all(name: str, kind: type) -> dict:
+        given = ((node, section.get(name)) for node, section in sections.items())
+        return {node: one for node, one in given if isinstance(one, kind)}
 
-    in_step = of_all('lockstep', bool)
-    return all(in_step) if in_step else None, max(of_all('input_max_age_s', float), default=OLD_S)
+    in_step = of_all('lockstep', bool).values()
+    return all(in_step) if in_step else None, of_all('input_max_age_s', float)
 
 
 def _from_parameters(values: dict, source: str) -> NodeSettings:

@@ -77,7 +77,8 @@ def verify(
         if reason:
             yield Verdict(name, SKIPPED, reason)
             continue
-        work = in_lockstep if lockstep else partial(free_running, max_age_s=given.max_age_s)
+        old_s = given.old_s(block.wired.node)
+        work = in_lockstep if lockstep else partial(free_running, max_age_s=old_s)
         recorded = RecordedBlock(block, settings)
         try:
             yield work(recorded, recording, progress=partial(progress, name))
