@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recorder that knows nothing of the lockstep, such as ``ros2 bag record``, gets a whole run."""
 
+import json
 import os
 import time
 from collections import Counter
@@ -12,6 +13,7 @@ from mcap.writer import Writer
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import SetBool
+from typer.testing import CliRunner
 
 from command_line import Started
 from glider_base.ros.places import domain_id
@@ -25,6 +27,7 @@ from glider_base.ros.wire.topics import (
     recorded_topics,
 )
 from glider_base.wiring import readers
+from glider_bringup.cli import app
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import PLANT, RECORDER, node_commands
 from glider_bringup.scoring.again import score_again
@@ -158,4 +161,7 @@ def test_paused_at_its_start_a_run_is_recorded_whole_and_scored(fly):
     card = score_again(folder)
     assert (card['status'], card['ticks'], card['messages_lost']) == ('completed', TICKS, 0)
     assert card['sim_time_s'] == pytest.approx(TICKS / 10)
+    done = CliRunner().invoke(app, ['verify', str(folder), '--json'])
+    said = json.loads(done.stdout)
+    assert said['identical'], [(one['block'], one['first']) for one in said['blocks']]
     recorder.node.destroy_node()

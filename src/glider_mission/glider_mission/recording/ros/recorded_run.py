@@ -10,7 +10,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.serialization import deserialize_message
 
 from glider_base.ros.lockstep import health
-from glider_base.ros.wire.codec import Codec
+from glider_base.ros.wire.codec import Codec, to_cdr
 from glider_base.ros.wire.topics import topic_of
 from glider_base.settings import ConfigurationError
 from glider_mission.recording.mcap_reader import Bag
@@ -145,7 +145,9 @@ class Recording:
                 self.events.append(Event(int(batch.log_ns[index]), '', '', {}, raw))
                 continue
             values = {pair.key: pair.value for pair in status.values}
-            stamp_ns = health.stamp_of(array)
+            stamp_ns, said = health.stamp_of(array), to_cdr(array)
+            if raw == said + bytes(-len(said) % 4):  # the middleware sends whole words
+                raw = said
             self.events.append(Event(stamp_ns, status.name, status.message, values, raw))
 
 
