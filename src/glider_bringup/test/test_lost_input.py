@@ -269,6 +269,15 @@ def test_a_clock_that_is_set_forward_is_no_lost_input(by_hand, heard):
     assert not heard or SAFE not in [command[1:4] for command in commands[before:]]
 
 
+@pytest.mark.parametrize('is_simulated', [True, False])
+def test_a_clock_that_is_set_forward_is_no_slow_machine(by_hand, is_simulated):
+    """By a first fix, say; one that nobody can set shows that this node was stopped."""
+    flight = by_hand(use_sim_time=is_simulated)
+    for s in (*20 * [0.1], 3600.0, *110 * [0.1]):
+        flight.cycle({**INPUTS, 'demand': DEMAND}, s)
+    assert any('too slow' in said for said in flight.said) == (not is_simulated)
+
+
 def test_who_commands_beside_the_guard_is_named(flight):
     """Nobody on board hears the command: whoever else gives one moves the vehicle unseen."""
     vehicle = flight.vehicle.node

@@ -188,6 +188,8 @@ class StepNode(TickNode):
                 item.arrived_s = min(item.arrived_s, now_s)
                 item.owner.heard_s = min(item.owner.heard_s, now_s)
             self._tell_s = min(self._tell_s, now_s)
+            if self.cycle_clock is not self.steady_clock:  # no slow machine: /clock may be set
+                since_s = TICK_S
         self._cycle_s = now_s
         return max(1, round(since_s / TICK_S))
 
