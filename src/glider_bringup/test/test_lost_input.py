@@ -278,6 +278,14 @@ def test_a_clock_that_is_set_forward_is_no_slow_machine(by_hand, is_simulated):
     assert any('too slow' in said for said in flight.said) == (not is_simulated)
 
 
+@pytest.mark.parametrize(('silent_s', 'said'), [(5.4, ' for 5.4 s'), (-5.4, '')])
+def test_nobody_was_silent_for_less_than_no_time(by_hand, silent_s, said):
+    """As a driver whose /clock begins anew with it."""
+    flight = by_hand()
+    flight.guard.tell_successor(flight.guard.inputs[0], silent_s)
+    assert flight.said[-1].endswith(f', which was silent{said}')
+
+
 def test_who_commands_beside_the_guard_is_named(flight):
     """Nobody on board hears the command: whoever else gives one moves the vehicle unseen."""
     vehicle = flight.vehicle.node

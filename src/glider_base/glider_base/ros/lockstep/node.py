@@ -371,9 +371,10 @@ class TickNode(Node):
     def tell_successor(self, item: Input, silent_s: float) -> None:
         """Tell that an input is somebody else's from now on."""
         owner, topic = item.owner, self.resolve_topic_name(item.topic.name)
+        how_long = f' for {silent_s:.1f} s' if silent_s >= 0.0 else ''  # less: it was set back
         said = (
             f'{topic}: {owner.name} ({shown(owner.gid)}) takes the place of '
-            f'{owner.before or "a node without a name"}, which was silent for {silent_s:.1f} s'
+            f'{owner.before or "a node without a name"}, which was silent{how_long}'
         )
         self.event(max(0, item.stamp_ns), health.WARN, said)
 
