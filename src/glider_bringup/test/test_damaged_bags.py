@@ -4,6 +4,7 @@
 
 import json
 import math
+import os
 import random
 import shutil
 import struct
@@ -195,6 +196,21 @@ def test_cut_run_is_not_completed_wherever_it_is_shown(run, share):
     for words in (['figure'], *(['export', '--to', kind] for kind in ('netcdf', 'csv', 'kml'))):
         done = CliRunner().invoke(app, [*words, str(run)], catch_exceptions=False)
         assert f'status: aborted ({card["reason"]})' in done.stderr, words
+
+
+def test_cut_run_goes_as_far_as_its_ticks_whatever_was_told_later(tmp_path):
+    """The direct engine hands on many ticks at once: each event follows its tick all the same."""
+    orders = [{'at_s': (TICKS - 2) * TICK_S, 'depth_m': 500.0}]
+    changes = {'dives': 0, 'duration_s': TICKS * TICK_S, 'orders': orders}
+    run = bags.fly_whole(load_scenario('current_8deg', changes), tmp_path / 'flight')
+    with bag_of(run).open('rb') as stream:
+        times = [
+            one.log_time for *_, one in make_reader(stream).iter_messages(log_time_order=False)
+        ]
+    assert times == sorted(times)
+    os.truncate(bag_of(run), int(0.6 * bag_of(run).stat().st_size))
+    card = score_again(run)
+    assert f'it goes to t = {(card["ticks"] - 1) * TICK_S:.1f} s' in card['reason']
 
 
 @pytest.mark.parametrize('size', [0, 1, 100, 6000])

@@ -48,6 +48,7 @@ class LogWriter:
         self._tellings = [Telling(block) for block in BLOCKS if block.say]
         self._settings = settings
         self._orders: list[tuple[int, list[Order]]] = []  #: to be written, by tick
+        self._events: list[tuple[int, str, bytes]] = []  #: to be written with their ticks
         self._tell_path(0)
 
     def follow(self, tick: int, orders: list[Order]) -> None:
@@ -64,11 +65,12 @@ class LogWriter:
         for topic in self._topics:
             values = log[:, COLUMNS[topic.name]] if topic.name in COLUMNS else log[:, :0]
             payloads[topic.name] = topic.codec.encode_many(stamps, values)
-        self._bag.write_ticks(stamps, payloads)
+        self._bag.write_ticks(stamps, payloads, self._events)
+        self._events.clear()
         self._tick += len(log)
 
     def _tell(self, stamps: np.ndarray, log: np.ndarray) -> None:
-        """Write the events of each block."""
+        """Note the events of each block."""
         for telling in self._tellings:
             block = telling.block
             flags = log[:, [COLUMNS[flag] for flag in block.flags]].astype(np.int64)
@@ -76,15 +78,15 @@ class LogWriter:
             for row in telling.among(flags, stamps):
                 stamp_ns = int(stamps[row])
                 event = health.said_array(stamp_ns, node, block.say(*flags[row].tolist()))
-                self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
+                self._events.append((stamp_ns, '/diagnostics', to_cdr(event)))
 
     def _tell_path(self, stamp_ns: int) -> None:
-        """Write the path that is followed from now on."""
+        """Note the path that is followed from now on."""
         points = self._settings.path.points(PATH_POINTS)
-        self._bag.write('path', stamp_ns, to_cdr(path_message(points, stamp_ns)))
+        self._events.append((stamp_ns, 'path', to_cdr(path_message(points, stamp_ns))))
 
     def _tell_orders(self, tick: int, orders: list[Order]) -> None:
-        """Write the orders that hold from a tick on: one event of a kind, and one path."""
+        """Note the orders that hold from a tick on: one event of a kind, and one path."""
         stamp_ns = tick * TICK_NS
         path, held = self._settings.path, {}
         for order in orders:
@@ -93,7 +95,7 @@ class LogWriter:
                 self._settings = changed(before, order)
             except ConfigurationError as error:
                 event = health.status_array(stamp_ns, _GUIDANCE, health.WARN, refused(error), {})
-                self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
+                self._events.append((stamp_ns, '/diagnostics', to_cdr(event)))
                 continue
             values = held.setdefault(message, {})
             values.update(changed_parameters(before, self._settings))
@@ -101,7 +103,7 @@ class LogWriter:
             self._tell_path(stamp_ns)
         for message, values in held.items():
             event = health.status_array(stamp_ns, _GUIDANCE, health.OK, message, values)
-            self._bag.write('/diagnostics', stamp_ns, to_cdr(event))
+            self._events.append((stamp_ns, '/diagnostics', to_cdr(event)))
 
     def finish(self, failure: str = '') -> None:
         """Write that the run is complete or why it failed, as the plant says it at its end."""

@@ -3,6 +3,7 @@
 """A run's folder as rosbag2 (Jazzy) would have written it, with MCAP storage."""
 
 import errno
+import itertools
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -139,20 +140,30 @@ class BagWriter:
         """Add a serialized message."""
         self._mcap.write(self._channels[topic], stamp_ns, payload)
 
-    def write_ticks(self, stamps_ns: Sequence[int], payloads: Mapping[str, np.ndarray]) -> None:
+    def write_ticks(
+        self,
+        stamps_ns: Sequence[int],
+        payloads: Mapping[str, np.ndarray],
+        events: Iterable[tuple[int, str, bytes]] = (),
+    ) -> None:
         """Add many whole ticks, interleaved by stamp and cut into chunks as a recorder does.
 
-        Stamps int64[n] ascend; payloads are messages by topic, as of `Codec.encode_many`.
+        Stamps int64[n] ascend; payloads are messages by topic, as of `Codec.encode_many`. Each
+        event, as `write` takes it but with its stamp first, follows its tick.
         """
-        stamps_ns = np.asarray(stamps_ns, np.int64)
+        stamps_ns, rest = np.asarray(stamps_ns, np.int64), sorted(events)
         chunk_of = stamps_ns // (CHUNK_TICKS * TICK_NS)
-        edges = [0, *(np.flatnonzero(np.diff(chunk_of)) + 1), len(stamps_ns)]
+        told = np.searchsorted(stamps_ns, [event[0] for event in rest], 'right')
+        edges = {0, *(np.flatnonzero(np.diff(chunk_of)) + 1), *told, len(stamps_ns)}
         channels = [self._channels[topic] for topic in payloads]
-        for start, end in zip(edges[:-1], edges[1:], strict=True):
-            if start:
-                self.flush()
+        for start, end in itertools.pairwise(sorted(edges)):
             blocks = [payload[start:end] for payload in payloads.values()]
             self._mcap.write_rows(channels, stamps_ns[start:end], blocks)
+            while rest and rest[0][0] <= stamps_ns[end - 1]:
+                stamp_ns, topic, payload = rest.pop(0)
+                self.write(topic, stamp_ns, payload)
+            if end < len(stamps_ns) and chunk_of[end] != chunk_of[end - 1]:
+                self.flush()
         if len(stamps_ns):
             self.end_tick(int(stamps_ns[-1]))
 
