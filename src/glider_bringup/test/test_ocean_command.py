@@ -3,6 +3,7 @@
 """``./glider ocean``: what is in a file, whether it covers a mission, and its chart."""
 
 import json
+import math
 
 import matplotlib.image
 import numpy as np
@@ -69,6 +70,17 @@ def test_it_tells_what_is_in_a_file(sea_file, capsys):
     assert currents['land_share'] == pytest.approx(9 / 441)
     assert currents['speed_mps'] == pytest.approx({'rms': 0.5, 'max': 0.5})
     assert (found['water'], found['bottom'], found['mission']) == (None, None, None)
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_fill_that_is_not_declared_is_told_as_it_is(sea_file, tmp_path, capsys):
+    """What NetCDF fills with by itself is too large for its square as float32."""
+    path, fill = tmp_path / 'filled.nc', np.float32(9.96921e36)
+    with xarray.open_dataset(sea_file) as sea:
+        sea.astype('float32').fillna(fill).to_netcdf(path, engine='scipy')
+    currents = told(capsys, path)['currents']
+    assert [one['high'] for one in currents['variables']] == [pytest.approx(fill)] * 2
+    assert currents['speed_mps']['rms'] == pytest.approx(math.sqrt(18 / 441) * fill)
 
 
 @pytest.mark.parametrize('by', [['longitude'], []])

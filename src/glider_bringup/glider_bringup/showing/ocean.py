@@ -96,7 +96,7 @@ def _listed(name: str, part: Part) -> dict[str, Any]:
         for one, values in zip(variables, numbers, strict=True):
             one |= {'low': float(values.min()), 'high': float(values.max())}
         if name == 'currents':
-            speed = np.hypot(*(values[0] for values in numbers))
+            speed = np.hypot(*(values[0].astype(float) for values in numbers))
             rms = math.sqrt(float(np.mean(speed**2)))
             listed['speed_mps'] = {'rms': rms, 'max': float(speed.max())}
     return listed
