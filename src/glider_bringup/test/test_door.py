@@ -35,12 +35,14 @@ from glider_base.kernel import kernel, on_compiling
 from glider_base.settings import ConfigurationError
 from glider_bringup import console
 from glider_bringup.cli import OF_THE_SCRIPT, _added, app
+from glider_bringup.door.dataset import numbers_of
 from glider_bringup.door.export import write_mat
 from glider_bringup.door.run import chosen_scenario
 from glider_guidance.method import Asked
 from glider_guidance.method import method_step as guidance_step
+from glider_mission.blocks import COLUMNS, ROW
 from glider_model.ocean.field import field_velocity
-from glider_navigation.block import say
+from glider_navigation.block import NO_ATTITUDE, say
 from glider_navigation.method import method_step as navigation_step
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
@@ -195,6 +197,15 @@ def test_odometry_is_that_of_the_messages_in_ned_and_frd(data, messages):
     assert np.abs(turned - expected).max() < 1e-12
     quaternion = columns(data, 'odom', 'q_x', 'q_y', 'q_z', 'q_w')
     assert np.abs(Rotation.from_quat(quaternion).as_matrix() - expected).max() < 1e-12
+
+
+def test_angles_are_not_known_where_navigation_has_no_attitude():
+    """It says a quaternion of zeros, by which the vehicle would be level, and head north."""
+    row = np.zeros(ROW)
+    row[COLUMNS['odom']][3:7] = NO_ATTITUDE
+    numbers = numbers_of(row, glider.load_scenario('slocum_shelf'))
+    angles = [numbers[f'odom_{angle}'] for angle in ('roll', 'pitch', 'heading')]
+    assert np.isnan(angles).all()
 
 
 def test_joints_water_and_control_are_those_of_the_messages(data, messages):

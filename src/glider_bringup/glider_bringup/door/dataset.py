@@ -210,6 +210,8 @@ def _turn(log, out):
     for row in range(log.shape[0]):
         estimated = odometry_from_wire(log[row, _ODOM : _ODOM + 13])
         angles = euler_from_quaternion(estimated.q_w, estimated.q_x, estimated.q_y, estimated.q_z)
+        if estimated[3:7] == (0.0, 0.0, 0.0, 0.0):  # navigation has no attitude
+            angles = (np.nan, np.nan, np.nan)
         reference = reference_from_wire(log[row, _REFERENCE : _REFERENCE + 13])
         water = water_from_wire(log[row, _CURRENT : _CURRENT + 3])
         estimate = water_from_wire(log[row, _ESTIMATE : _ESTIMATE + 3])
