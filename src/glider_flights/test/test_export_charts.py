@@ -11,10 +11,12 @@ from typer.testing import CliRunner
 
 import glider_bringup as glider
 from glider_base.errors import ConfigurationError
+from glider_base.signals import TICK_S
 from glider_bringup.cli import app
 from glider_bringup.door import tracks
 from glider_bringup.door.tracks import write_mafiles
 from glider_bringup.showing.flown_run import read_run
+from glider_guidance.order import Order
 from glider_mission.scenario import load_scenario
 
 WAYPOINTS = [(47.5, -52.5), (47.51, -52.49), (47.52, -52.5)]
@@ -313,3 +315,11 @@ def test_the_route_is_that_of_the_orders(tmp_path):
     (route,) = [one for one in features if one['properties']['name'] == 'route']
     east, north, *_ = route['geometry']['coordinates'][-1]
     assert east > WAYPOINTS[0][1] + 0.002 and abs(north - WAYPOINTS[0][0]) < 0.0005
+
+
+def test_the_route_is_that_of_the_mission_until_the_time_of_an_order_comes(flown):
+    run = read_run(flown.folder)
+    late = {'at_s': run.traces.ticks * TICK_S, 'path': {'kind': 'straight', 'length_m': 2000.0}}
+    waypoints = tracks.chart_of(run, None).route
+    run = run._replace(scenario=run.scenario.model_copy(update={'orders': [Order(**late)]}))
+    assert tracks.chart_of(run, None).route == waypoints

@@ -90,8 +90,9 @@ class FlownRun(NamedTuple):
 
     @property
     def is_rerouted(self) -> bool:
-        """Whether an order changed the path."""
-        return any(order.path for order in self.scenario.orders)
+        """Whether an order changed the path: one whose time came."""
+        ticks = self.traces.ticks
+        return any(order.path and order.tick < ticks for order in self.scenario.orders)
 
     def path_points(self) -> list[list[float]]:
         """The desired path (m, NED): as far as it was followed, where it goes on at its end.
