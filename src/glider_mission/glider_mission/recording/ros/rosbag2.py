@@ -151,7 +151,8 @@ class BagWriter:
         Stamps int64[n] ascend; payloads are messages by topic, as of `Codec.encode_many`. Each
         event, as `write` takes it but with its stamp first, follows its tick.
         """
-        stamps_ns, rest = np.asarray(stamps_ns, np.int64), sorted(events)
+        stamps_ns = np.asarray(stamps_ns, np.int64)
+        rest = sorted(events, key=lambda event: event[0])
         chunk_of = stamps_ns // (CHUNK_TICKS * TICK_NS)
         told = np.searchsorted(stamps_ns, [event[0] for event in rest], 'right')
         edges = {0, *(np.flatnonzero(np.diff(chunk_of)) + 1), *told, len(stamps_ns)}
