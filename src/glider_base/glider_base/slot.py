@@ -18,6 +18,7 @@ import functools
 import inspect
 import re
 from collections.abc import Callable
+from traceback import extract_tb
 from typing import Any
 
 from numba import typeof
@@ -31,6 +32,7 @@ from glider_base.kernels.cache import BODIES, Body
 
 #: What numba raises for a function that it cannot compile.
 NOT_COMPILED = (NumbaError, UnsupportedBytecodeError)
+_REAL = types.Integer | types.Float | types.Boolean
 
 
 def slot(stub: Callable) -> Callable:
@@ -103,8 +105,19 @@ def returns(*what: str | type) -> Callable:
     return mark
 
 
-def usable(values: Any, what: str) -> Any:
-    """State or params as they are; a ConfigurationError if kernels cannot take them."""
+def usable(what: str, make: Callable, *of: Any) -> Any:
+    """State or params that somebody's class makes of something.
+
+    A ConfigurationError names them if it raises, or kernels cannot take what it made.
+    """
+    try:
+        values = make(*of)
+    except ConfigurationError:
+        raise
+    except Exception as error:  # it may not be our code
+        inside = extract_tb(error.__traceback__)[1:2]
+        where = ''.join(f'{at.filename}, line {at.lineno}: ' for at in inside)
+        raise ConfigurationError(f'{what}: {where}{type(error).__name__}: {error}') from error
     try:
         typeof(values)
     except ValueError:
@@ -133,13 +146,13 @@ def _is_usable(kind: Any, what: str | type) -> bool:
     """Whether compiled code can take what is returned for what: numbers, and tuples of them."""
     if isinstance(what, type):
         return getattr(kind, 'instance_class', None) is what and _is_numbers(kind)
-    return isinstance(kind, types.Number | types.Boolean | types.BaseTuple | types.Array)
+    return isinstance(kind, _REAL | types.BaseTuple | types.Array)
 
 
 def _is_numbers(kind: Any) -> bool:
     if isinstance(kind, types.BaseTuple):
         return all(map(_is_numbers, kind))
-    return isinstance(kind, types.Number | types.Boolean)
+    return isinstance(kind, _REAL)
 
 
 def _check(kernel: Any, kinds: tuple, what: tuple[str | type, ...]) -> None:

@@ -620,6 +620,10 @@ def moments_by_an_import(seen):
     return tanh(seen.m_b), 0.0
 
 
+def moment_on_two_axes(seen):
+    return 0.0, 1.0j
+
+
 def two_or_three(seen):
     return (0.0, 0.0) if seen.m_b > 0.0 else (0.0, 0.0, 0.0)
 
@@ -737,6 +741,17 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
             {},
             ["control.law: initial_state: {'count': 0}: not usable", 'NamedTuple of numbers'],
         ),
+        (
+            run_cell(CELL.replace('Level(self.k)', 'Level(vehicle.keel.value)')),
+            {},
+            ['control.law: params: <ipython-input-1>, line ', ': AttributeError: ', 'keel'],
+        ),
+        (
+            run_cell(CELL.replace('return Turns(0)', 'return Turns(1 // 0)')),
+            {},
+            ['control.law: initial_state: <ipython-input-1>, line ', ': ZeroDivisionError: '],
+        ),
+        (moment_on_two_axes, {}, ['moment_on_two_axes (', 'complex128 as pitch moment']),
         (run_cell(CELL.replace('def initial', 'def first')), {}, ['LevelLaw', 'no initial_state']),
         (run_cell(CELL.partition('@law')[0]), {}, ['law_step: no body for params of type Level']),
         (run_cell(CELL + LEARNT), {}, ['learnt (<ipython-input-1>', 'returns 2', 'roll_bias_nm']),

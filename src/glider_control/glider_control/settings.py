@@ -122,14 +122,15 @@ class ControlSettings(ControlLawSettings):
         vehicle = load_vehicle(self.vehicle)
         kernel_vehicle = vehicle.params()
         filters, bank = self.filters, self.heading.params()
-        surface = self.steering(vehicle.steers_by)
+        surface, steers = self.steering(vehicle.steers_by), NoSteering()
         if surface:
             bank = bank._replace(limit=0.0)  # it is held level
+            steers = usable('control.steering: params', surface.params, vehicle)
         return ControlParams(
             allocation=make_allocation(kernel_vehicle),
             polar=make_polar(kernel_vehicle),
-            law=usable(self.chosen.params(vehicle, bank), 'control.law: params'),
-            steering=surface.params(vehicle) if surface else NoSteering(),
+            law=usable('control.law: params', self.chosen.params, vehicle, bank),
+            steering=steers,
             buoyancy_ki=self.buoyancy.ki_kg_per_m,
             drag_ki=self.buoyancy.drag_ki_kg_per_m,
             buoyancy_trim_max=self.buoyancy.trim_limit_kg,
@@ -146,12 +147,14 @@ class ControlSettings(ControlLawSettings):
 
     def initial_state(self) -> 'ControlState':
         """State before the first tick."""
-        surface = self.steering(load_vehicle(self.vehicle).steers_by)
+        surface, steers = self.steering(load_vehicle(self.vehicle).steers_by), NoSteering()
+        if surface:
+            steers = usable('control.steering: initial_state', surface.initial_state)
         return ControlState(
             tick=0,
             measured=STILL,
-            law=usable(self.chosen.initial_state(), 'control.law: initial_state'),
-            steering=surface.initial_state() if surface else NoSteering(),
+            law=usable('control.law: initial_state', self.chosen.initial_state),
+            steering=steers,
         )
 
 

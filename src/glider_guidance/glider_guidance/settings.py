@@ -245,7 +245,7 @@ class GuidanceSettings(GuidanceLawSettings):
             profile=profile,
             polar=polar,
             profile_speed=glide_horizontal_speed(profile.pitch, profile.glide_rate, polar),
-            method=usable(self.chosen.params(self.los, vehicle), 'guidance.los.method: params'),
+            method=usable('guidance.los.method: params', self.chosen.params, self.los, vehicle),
             end_s=self.duration_s if self.duration_s > 0.0 else math.inf,
             ends_with_path=self.path.at_end == 'stop',
             no_progress_surfacings=self.no_progress_surfacings,
@@ -263,5 +263,5 @@ class GuidanceSettings(GuidanceLawSettings):
         """State before the first tick."""
         followed = Followed(STILL, self.steering.initial_state())
         return GuidanceState(
-            usable(self.chosen.initial_state(), 'guidance.los.method: initial_state'), followed
+            usable('guidance.los.method: initial_state', self.chosen.initial_state), followed
         )

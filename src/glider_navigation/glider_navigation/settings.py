@@ -133,14 +133,14 @@ class NavigationSettings(NavigationLawSettings):
         return NavigationParams(
             self.origin.params(),
             intake,
-            usable(self.chosen.params(self._start), 'navigation.method: params'),
+            usable('navigation.method: params', self.chosen.params, self._start),
         )
 
     def initial_state(self) -> 'NavigationState':
         """State before the first tick."""
         return NavigationState(
             IntakeState(),
-            usable(self.chosen.initial_state(self._start), 'navigation.method: initial_state'),
+            usable('navigation.method: initial_state', self.chosen.initial_state, self._start),
         )
 
 

@@ -5,9 +5,11 @@
 import numba
 import pytest
 
+from glider_base.errors import ConfigurationError
 from glider_bringup.engines import direct
 from glider_bringup.engines.compiling import compile_loops, shown_once
 from glider_bringup.engines.flight import mission_of
+from glider_control.laws.pid import PidSettings
 from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import load_scenario, scenario_names
 from glider_studies import workers
@@ -74,6 +76,16 @@ def test_loops_are_there_before_workers_start(monkeypatch):
     ):
         pass
     assert types_of(scenario) in loops()
+
+
+def test_a_law_that_refuses_the_vehicle_of_others_is_told_by_its_flights(monkeypatch):
+    def params(self, vehicle, bank):
+        return (bank.limit / vehicle.volume.value,)  # zhang2021 has no volume
+
+    monkeypatch.setattr(PidSettings, 'params', params)
+    compile_loops([Combination('pid', 'los_current')], pytest.fail)
+    with pytest.raises(ConfigurationError, match='control.law: params: .*test_compiling.py'):
+        mission_of(load_scenario(changes={'control.law': 'pid'}))
 
 
 def test_the_loop_of_a_vehicle_for_shallow_water_is_compiled_too():

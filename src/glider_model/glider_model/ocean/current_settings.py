@@ -412,7 +412,7 @@ class SumOfCurrents(_Flow):
             else:
                 first[i], last[i] = row, row + len(part.rows)
                 row = last[i]
-        field = self.field.params() if self.field else NoField()
+        field = usable('current.field: params', self.field.params) if self.field else NoField()
         return CurrentParams(
             kind=kind,
             numbers=numbers,
@@ -420,7 +420,7 @@ class SumOfCurrents(_Flow):
             last=last,
             stream=stream,
             table=np.array(table, dtype=float).reshape(-1, 4),
-            field=usable(field, 'current.field: params'),
+            field=field,
         )
 
 

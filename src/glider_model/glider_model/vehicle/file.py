@@ -25,6 +25,7 @@ from glider_base.settings import (
     validate,
 )
 from glider_base.signals import Joints
+from glider_base.slot import usable
 from glider_base.wiring import JOINTS
 from glider_model.vehicle import surfaces
 from glider_model.vehicle.actuators import ActuatorErrors
@@ -273,7 +274,9 @@ class Vehicle(_Steered):
                 self.shallowest_glide.value if self.shallowest_glide else SHALLOWEST_GLIDE_DEG
             ),
             slowest_glide=self.slowest_glide.value if self.slowest_glide else SLOWEST_GLIDE_MPS,
-            surface=surface.params() if surface else NoSurface(),
+            surface=usable(f'{self.steers_by}: params', surface.params)
+            if surface
+            else NoSurface(),
             delta_max=math.radians(surface.range.value) if surface else 0.0,
             delta_rate=math.radians(surface.rate.value) if surface else 0.0,
             errors=self._errors(surface),
