@@ -7,6 +7,8 @@ import math
 import pickle
 import subprocess
 import sys
+from contextlib import nullcontext
+from functools import partial
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -266,6 +268,33 @@ def test_a_law_that_raises_ends_its_node_by_the_same_words():
     with pytest.raises(Stop, match=rf'{RAISED} 3 \(t = 0.3 s\)') as stop:
         BlockNode.step(node, 3 * TICK_NS)
     assert (stop.value.code, ended(False, str(stop.value))) == (1, 'failed')
+
+
+@pytest.mark.parametrize('lockstep', [False, True])
+def test_a_law_that_returns_no_number_ends_its_node_in_lockstep_and_else_is_not_heard(lockstep):
+    """On board the guard then misses `demand`; it was a roll to the limit."""
+    moments, sent, told = [0.0, math.nan, math.nan, 0.0], [], []
+
+    def tick(state, t_s, inputs, params, dt):
+        tau_p = moments[round(t_s / dt)]
+        return state, ((max(-1.0, min(1.0, tau_p)),), (tau_p,)), (0,)
+
+    wired = SimpleNamespace(name='control', outputs=('demand', 'wrench'))
+    block = SimpleNamespace(tick=tick, wired=wired, say=None)
+    node = SimpleNamespace(orders={}, absent=(), passed=1, block=block, state=None, params=None)
+    node.ticks, node.wrong = SimpleNamespace(lockstep=lockstep), ''
+    node.is_wrong = partial(BlockNode.is_wrong, node)
+    node.repeat = lambda: sent.append(node.said[0] // TICK_NS)
+    node.event = lambda stamp_ns, level, said: told.append(said)
+    words = 'control: wrench is not finite at tick 1 (t = 0.1 s)'
+    BlockNode.step(node, 0)
+    with pytest.raises(Stop) if lockstep else nullcontext() as stop:
+        for at in (1, 2, 3):
+            BlockNode.step(node, at * TICK_NS)
+    if lockstep:
+        assert (str(stop.value), sent) == (words, [0])
+    else:
+        assert (told, sent) == ([f'{words}; silent until it is'], [0, 3])
 
 
 @pytest.mark.parametrize(

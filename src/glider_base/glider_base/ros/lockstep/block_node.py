@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node of a block: everything that follows from what the block declares of itself."""
 
+import math
 import time
 
 from pydantic import Field
@@ -18,7 +19,7 @@ from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.parameters import changed_parameters, declare_settings
 from glider_base.settings import Settings
-from glider_base.signals import TICK_NS, TICK_S, at_tick, raised
+from glider_base.signals import TICK_NS, TICK_S, at_tick, not_finite, raised
 from glider_base.wiring import at_rest, not_fitted, present
 
 RCLError = rclpy_implementation.RCLError
@@ -70,6 +71,8 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         self.state = self.settings.initial_state()
         self.telling = Telling(self.block)
         self.flags: tuple[int, ...] | None = None  #: of the last answer
+        self.said: tuple[int, tuple] = (0, ())  #: its stamp, and the numbers
+        self.wrong = ''  #: what of the one that is due is not finite, in words
 
     def on_ready(self) -> None:
         """Begin, or offer the services of a managed node."""
@@ -160,13 +163,30 @@ class BlockNode(StepNode, LifecycleNodeMixin):
                 raise Stop(EXIT_FAILED, at_tick(raised(error), tick)) from error
         if self.block.say and self.telling.is_due(flags, stamp_ns):
             self.tell(stamp_ns, flags)
-        #: the last answer: its stamp, and the numbers
-        self.said, self.flags = (stamp_ns, outputs), flags
-        self.repeat()
+        self.flags = flags
+        if not self.is_wrong(stamp_ns, outputs):
+            self.said = (stamp_ns, outputs)
+            self.repeat()
+
+    def is_wrong(self, stamp_ns: int, outputs: tuple[tuple[float, ...], ...]) -> bool:
+        """Whether an answer has a number that is not finite: in lockstep the run ends by it."""
+        wired, before = self.block.wired, self.wrong
+        wrong = (i for i, numbers in enumerate(outputs) if not math.isfinite(sum(numbers)))
+        if (i := next(wrong, None)) is None:
+            self.wrong = ''
+            return False
+        self.wrong = not_finite(f'{wired.name}: {wired.outputs[i]}', stamp_ns // TICK_NS)
+        if self.ticks.lockstep:
+            raise Stop(EXIT_FAILED, self.wrong)
+        if not before:
+            self.event(stamp_ns, health.ERROR, f'{self.wrong}; silent until it is')
+        return True
 
     def condition(self) -> Said:
         """How this node is: what its block says."""
         condition = super().condition()
+        if self.wrong:
+            return Said('error', self.wrong)
         if self.flags is None or not self.block.say or condition.level != 'ok':
             return condition
         return self.block.say(*self.flags)
@@ -175,7 +195,8 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         """Send the last answer, once more if no time has passed since."""
         stamp_ns, outputs = self.said
         for send, place in zip(self.senders, self.sent, strict=True):
-            send(stamp_ns, outputs[place])
+            if outputs:
+                send(stamp_ns, outputs[place])
 
     def tell(self, stamp_ns: int, flags: tuple[int, ...]) -> None:
         """Put a change of the flags on /diagnostics."""
