@@ -144,8 +144,13 @@ def test_a_state_of_another_law_or_navigation_is_refused():
     flight = glider.Flight('current_8deg')
     flight.step(10)
     before = numbers(flight)
-    for name, law in (('current_8deg', 'pid'), ('reckoned_12deg', None)):
-        other = glider.Flight(name, controller=law)
+    gust = {'kind': 'gauss_markov', 'std_mps': 0.1, 'time_constant_s': 100.0}
+    for name, fields, law in (
+        ('current_8deg', {}, 'pid'),
+        ('reckoned_12deg', {}, None),
+        ('current_8deg', {'current.components': [gust]}, None),
+    ):
+        other = glider.Flight(name, fields, controller=law)
         with pytest.raises(glider.ConfigurationError, match='state: of another flight'):
             flight.restore(other.state)
         assert numbers(flight) == before and flight.tick == 10

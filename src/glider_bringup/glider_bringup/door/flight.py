@@ -152,7 +152,8 @@ class Flight:
     def restore(self, state: FlightState) -> 'Flight':
         """Go on from a state, of this flight or of another one of the same scenario.
 
-        One with another law, method or navigation is refused. Whether numbers of the scenario are
+        One with another law, method or navigation, or with more or fewer faults or parts of the
+        current, is refused. Whether numbers of the scenario are
         others is not known: the parameters are those of this flight, changed by the orders that
         the state has.
         """

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numba import typeof
@@ -78,6 +78,11 @@ class Sink(Protocol):
         """Take in the next rows, float64[n, ROW]; they are valid until the next are flown."""
 
 
+def _shapes(values: Any) -> Any:
+    """Shapes of what a state holds, of which its type says nothing; no kernel checks an index."""
+    return tuple(map(_shapes, values)) if isinstance(values, tuple) else np.shape(values)
+
+
 def mission_of(scenario: Scenario) -> tuple[MissionState, MissionParams]:
     """State at tick 0 and parameters of the six blocks."""
     blocks = scenario.block_settings()
@@ -143,10 +148,11 @@ class Held:
     def restore(self, kept: Kept) -> None:
         """Go on from there.
 
-        Raises ConfigurationError if it is of a mission with another law, or other blocks, or its
-        orders make no sense.
+        Raises ConfigurationError if it is of a mission with another law, other blocks, or more or
+        fewer faults or parts of the current, or its orders make no sense.
         """
-        if typeof(kept.mission) != typeof(held_state(self._held)):
+        state, own = kept.mission, held_state(self._held)
+        if typeof(state) != typeof(own) or _shapes(state) != _shapes(own):
             raise ConfigurationError(
                 'state: of another flight (allowed: of the same scenario and the same law)'
             )
