@@ -278,11 +278,11 @@ def test_a_law_that_raises_ends_its_node_by_the_same_words():
 @pytest.mark.parametrize('lockstep', [False, True])
 def test_a_law_that_returns_no_number_ends_its_node_in_lockstep_and_else_is_not_heard(lockstep):
     """On board the guard then misses `demand`; it was a roll to the limit."""
-    moments, sent, told = [0.0, math.nan, math.nan, 0.0], [], []
+    moments, sent, told = [1e308, math.nan, math.nan, 1e308], [], []
 
     def tick(state, t_s, inputs, params, dt):
         tau_p = moments[round(t_s / dt)]
-        return state, ((max(-1.0, min(1.0, tau_p)),), (tau_p,)), (0,)
+        return state, ((max(-1.0, min(1.0, tau_p)),), (tau_p, tau_p)), (0,)
 
     wired = SimpleNamespace(name='control', outputs=('demand', 'wrench'))
     block = SimpleNamespace(tick=tick, wired=wired, say=None)

@@ -171,7 +171,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
     def is_wrong(self, stamp_ns: int, outputs: tuple[tuple[float, ...], ...]) -> bool:
         """Whether an answer has a number that is not finite: in lockstep the run ends by it."""
         wired, before = self.block.wired, self.wrong
-        wrong = (i for i, numbers in enumerate(outputs) if not math.isfinite(sum(numbers)))
+        wrong = (i for i, numbers in enumerate(outputs) if not all(map(math.isfinite, numbers)))
         if (i := next(wrong, None)) is None:
             self.wrong = ''
             return False
