@@ -153,6 +153,8 @@ def test_a_plan_counts_what_is_pumped_as_the_nose_goes_over_and_a_dive_that_is_b
         (['water.bottom_m=150'], 'dives to 200 m touch a bottom at 150 m'),
         (['water.bottom_m=15', 'profile.clearance_m=10'], 'no dives where the bottom is 15 m'),
         (['orders=[{at_s: 900, depth_m: 50}]'], '1 order of the mission not counted'),
+        (['navigation.method=dead_reckoned'], 'no surfacing for a fix'),
+        (['navigation.method=dead_reckoned', 'profile.surface_every_dives=2'], None),
         (['profile.net_heaviness_kg=0.14', 'profile.pitch_deg=20'], 'dives and climbs are not'),
         (['profile.climb_net_heaviness_kg=0.05'], 'climbs are not steered by roll'),
         (['profile.net_heaviness_kg=0.05', 'vehicle=slocum_g2'], None),

@@ -16,7 +16,6 @@ from glider_bringup.cli import app
 from glider_bringup.door import tracks
 from glider_bringup.door.tracks import write_mafiles
 from glider_bringup.showing.flown_run import read_run
-from glider_guidance.order import Order
 from glider_mission.scenario import load_scenario
 
 WAYPOINTS = [(47.5, -52.5), (47.51, -52.49), (47.52, -52.5)]
@@ -321,5 +320,6 @@ def test_the_route_is_that_of_the_mission_until_the_time_of_an_order_comes(flown
     run = read_run(flown.folder)
     late = {'at_s': run.traces.ticks * TICK_S, 'path': {'kind': 'straight', 'length_m': 2000.0}}
     waypoints = tracks.chart_of(run, None).route
-    run = run._replace(scenario=run.scenario.model_copy(update={'orders': [Order(**late)]}))
+    orders = load_scenario('current_8deg', {'orders': [late]}).orders
+    run = run._replace(scenario=run.scenario.model_copy(update={'orders': orders}))
     assert tracks.chart_of(run, None).route == waypoints

@@ -83,6 +83,8 @@ def _notes(made: Any, scenario: Scenario) -> list[str]:
     orders, profile = len(scenario.orders), scenario.profile
     notes = scenario.unsteered + unballasted(scenario)
     notes += [f'{count(orders, "order")} of the mission not counted'] if orders else []
+    if 'fix' in scenario.topics and not profile.surface_every_dives:
+        notes.append('no surfacing for a fix: a vehicle that reckons its place is led astray')
     bottom_m = bottom_under(made.route.corners, scenario.bottom())
     if bottom_m <= 0.0:
         notes.append('no way round the land between waypoints is found in its time')
