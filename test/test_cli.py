@@ -206,6 +206,7 @@ MISTAKES = [
     (['trim', 'zhang2021', '--net-heaviness-kg', '0.4'], ['pitch']),
     (['score', '.'], ['not a run folder']),
     (['autopilot', 'helix', '--ros-args', '-r', '__ns:=/a'], ['__ns:=/a', '--namespace']),
+    (['autopilot', 'helix', '--ros-args', '-r', '__node:=a'], ['__node:=a', 'by their names']),
 ]
 
 

@@ -82,6 +82,8 @@ class GuidanceNode(BlockNode):
             self.arrived = False
         before = self.flags[2] if self.flags else 0
         super().step(stamp_ns, *inputs)
+        if self.wrong:
+            return
         no_progress = self.flags[2]
         if no_progress and not before:
             order = reaction(self.settings, no_progress, inputs[0], self.tick + 1)

@@ -72,7 +72,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         self.telling = Telling(self.block)
         self.flags: tuple[int, ...] | None = None  #: of the last answer
         self.said: tuple[int, tuple] = (0, ())  #: its stamp, and the numbers
-        self.wrong = ''  #: what of the one that is due is not finite, in words
+        self.wrong = ''  #: why there is none, in words
 
     def on_ready(self) -> None:
         """Begin, or offer the services of a managed node."""
@@ -156,31 +156,28 @@ class BlockNode(StepNode, LifecycleNodeMixin):
             inputs = (*inputs[:place], values, *inputs[place:])
         for tick in range(stamp_ns // TICK_NS + 1 - self.passed, stamp_ns // TICK_NS + 1):
             try:
-                self.state, outputs, flags = self.block.tick(
+                self.state, outputs, self.flags = self.block.tick(
                     self.state, tick * TICK_S, inputs, self.params, TICK_S
                 )
+                wrong = self.not_finite(outputs, tick)
             except Exception as error:  # of a law of somebody's own
-                raise Stop(EXIT_FAILED, at_tick(raised(error), tick)) from error
-        if self.block.say and self.telling.is_due(flags, stamp_ns):
-            self.tell(stamp_ns, flags)
-        self.flags = flags
-        if not self.is_wrong(stamp_ns, outputs):
-            self.said = (stamp_ns, outputs)
-            self.repeat()
+                outputs, wrong = (), at_tick(raised(error), tick)
+            if wrong and self.ticks.lockstep:
+                raise Stop(EXIT_FAILED, wrong)
+        if self.flags and self.block.say and self.telling.is_due(self.flags, stamp_ns):
+            self.tell(stamp_ns, self.flags)
+        if wrong and not self.wrong:
+            self.event(stamp_ns, health.ERROR, f'{wrong}; silent until that is over')
+        self.wrong = wrong
+        self.said = stamp_ns, () if wrong else outputs
+        self.repeat()
 
-    def is_wrong(self, stamp_ns: int, outputs: tuple[tuple[float, ...], ...]) -> bool:
-        """Whether an answer has a number that is not finite: in lockstep the run ends by it."""
-        wired, before = self.block.wired, self.wrong
-        wrong = (i for i, numbers in enumerate(outputs) if not all(map(math.isfinite, numbers)))
-        if (i := next(wrong, None)) is None:
-            self.wrong = ''
-            return False
-        self.wrong = not_finite(f'{wired.name}: {wired.outputs[i]}', stamp_ns // TICK_NS)
-        if self.ticks.lockstep:
-            raise Stop(EXIT_FAILED, self.wrong)
-        if not before:
-            self.event(stamp_ns, health.ERROR, f'{self.wrong}; silent until it is')
-        return True
+    def not_finite(self, outputs: tuple[tuple[float, ...], ...], tick: int) -> str:
+        """What of an answer is not finite, in words; empty if all of it is."""
+        for name, numbers in zip(self.block.wired.outputs, outputs, strict=True):
+            if not all(map(math.isfinite, numbers)):
+                return not_finite(f'{self.block.wired.name}: {name}', tick)
+        return ''
 
     def condition(self) -> Said:
         """How this node is: what its block says."""

@@ -50,8 +50,8 @@ def run_together(node_types: Sequence[Callable[[], Node]], args=None) -> int:
 
     ``node_types`` make the nodes, in the order in which they act in a tick; ``args`` are the
     command line, by default that of the process. Returns the exit code: 0 at the end of the run
-    and for SIGINT and SIGTERM, 1 for a full disk or a law that raises, 2 for a bad parameter, 3
-    for a peer that is missing, late or wrong.
+    and for SIGINT and SIGTERM, 1 for a full disk or in lockstep a law that raises, 2 for a bad
+    parameter, 3 for a peer that is missing, late or wrong.
     """
     os.environ.setdefault(_FASTDDS, str(_PROFILES))
     if signal.getsignal(signal.SIGINT) in (signal.default_int_handler, leave):
