@@ -40,6 +40,7 @@ from glider_guidance.yo.stage import STAGE_NAMES
 from glider_mission.blocks import COLUMNS
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
+from glider_navigation.block import NO_ATTITUDE
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
 #: Names of numbers, and what each is.
@@ -210,7 +211,7 @@ def _turn(log, out):
     for row in range(log.shape[0]):
         estimated = odometry_from_wire(log[row, _ODOM : _ODOM + 13])
         angles = euler_from_quaternion(estimated.q_w, estimated.q_x, estimated.q_y, estimated.q_z)
-        if estimated[3:7] == (0.0, 0.0, 0.0, 0.0):  # navigation has no attitude
+        if estimated[3:7] == NO_ATTITUDE:
             angles = (np.nan, np.nan, np.nan)
         reference = reference_from_wire(log[row, _REFERENCE : _REFERENCE + 13])
         water = water_from_wire(log[row, _CURRENT : _CURRENT + 3])
