@@ -12,6 +12,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from traceback import extract_tb
 from typing import Any
 
 #: Lines that an error has at most, but for one that says how many more there are.
@@ -109,6 +110,13 @@ def changes_text(changes: dict[str, Any]) -> str:
     fields = [f'{clipped(field)}={shown(value)}' for field, value in changes.items()]
     more = [f'{len(fields) - CHANGES_SHOWN} more'] if len(fields) > CHANGES_SHOWN else []
     return ' with ' + ', '.join(fields[:CHANGES_SHOWN] + more) if fields else ''
+
+
+def raised(error: BaseException, calls: int = 1) -> str:
+    """What code that may not be ours has raised, and where, so many calls from here, in words."""
+    frames = extract_tb(error.__traceback__)[calls : calls + 1]
+    where = ''.join(f'{at.filename}, line {at.lineno}: ' for at in frames)
+    return f'{where}{type(error).__name__}: {error}'
 
 
 @contextmanager

@@ -25,8 +25,9 @@ _HALF_SQRT2 = math.sqrt(0.5)
 #: WGS 84: semi-major axis (m), and the first eccentricity squared (-).
 _AXIS, _ECCENTRICITY2 = 6378137.0, 6.69437999014e-3
 UTC = timezone.utc  # noqa: UP017, which Python 3.10 does not have
-#: What a sensor_msgs/Imu says where there are no rates.
-NO_RATES = -1.0
+#: What a sensor_msgs/Imu says where there are no rates, and in the place of a quaternion where
+#: there is no attitude.
+NO_RATES, NO_ATTITUDE = -1.0, (0.0, 0.0, 0.0, 0.0)
 
 
 @kernel
@@ -78,6 +79,14 @@ def euler_from_quaternion(q_w, q_x, q_y, q_z):
     """Roll, pitch, heading (rad) of q_NB."""
     phi = math.atan2(2.0 * (q_w * q_x + q_y * q_z), 1.0 - 2.0 * (q_x * q_x + q_y * q_y))
     return phi, pitch_of(q_w, q_x, q_y, q_z), heading_of(q_w, q_x, q_y, q_z)
+
+
+@kernel
+def angles_if_any(quaternion):
+    """Roll, pitch, heading (rad) of q_NB, q_w first; NaN each of `NO_ATTITUDE`."""
+    if quaternion == NO_ATTITUDE:
+        return math.nan, math.nan, math.nan
+    return euler_from_quaternion(quaternion[0], quaternion[1], quaternion[2], quaternion[3])
 
 
 @kernel
@@ -169,13 +178,14 @@ def imu_from_wire(wire):
 def poses_from_wire(wire):
     """Poses of many messages, float64[n, >= 7] laid out as by ``odometry_to_wire``.
 
-    They are float64[n, 6]: north, east, depth (m), roll, pitch, heading (rad).
+    They are float64[n, 6]: north, east, depth (m), roll, pitch, heading (rad), which are NaN
+    where there is `NO_ATTITUDE`.
     """
     poses = np.empty((wire.shape[0], 6))
     for i in range(wire.shape[0]):
-        q_w, q_x, q_y, q_z = swap_world(wire[i, 3], wire[i, 4], wire[i, 5], wire[i, 6])
         poses[i, 0], poses[i, 1], poses[i, 2] = wire[i, 1], wire[i, 0], -wire[i, 2]
-        poses[i, 3], poses[i, 4], poses[i, 5] = euler_from_quaternion(q_w, q_x, q_y, q_z)
+        quaternion = swap_world(wire[i, 3], wire[i, 4], wire[i, 5], wire[i, 6])
+        poses[i, 3], poses[i, 4], poses[i, 5] = angles_if_any(quaternion)
     return poses
 
 

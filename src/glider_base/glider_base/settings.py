@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
 import pydantic
 
-from glider_base.errors import MAX_LINES, ConfigurationError, clipped, shown
+from glider_base.errors import MAX_LINES, ConfigurationError, clipped, raised, shown
 
 SettingsT = TypeVar('SettingsT', bound='Settings')
 ParamsT = TypeVar('ParamsT', bound=NamedTuple)
@@ -291,6 +291,21 @@ def _mistake(item: dict, model: type[pydantic.BaseModel]) -> Mistake:
     return tuple(path), text
 
 
+def made(
+    model: type[SettingsT], values: Any, source: str, context: dict[str, Any] | None = None
+) -> SettingsT:
+    """Settings of a model, which may have code that is not ours: what this raises is named.
+
+    Raises pydantic.ValidationError for values that are refused, else ConfigurationError.
+    """
+    try:
+        return model.model_validate(values, context=context)
+    except pydantic.ValidationError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise ConfigurationError(f'{source}: {raised(error, calls=2)}') from error
+
+
 def validate(
     model: type[SettingsT],
     values: Any,
@@ -307,7 +322,7 @@ def validate(
     """
     _refuse_flags_for_numbers(model, values, f'{source}{changed}')
     try:
-        return model.model_validate(values, context={'folder': folder} if folder else None)
+        return made(model, values, f'{source}{changed}', {'folder': folder} if folder else None)
     except pydantic.ValidationError as error:
         lines = []
         for location, text in mistakes(error, model):

@@ -18,7 +18,6 @@ import functools
 import inspect
 import re
 from collections.abc import Callable
-from traceback import extract_tb
 from typing import Any
 
 from numba import typeof
@@ -26,7 +25,7 @@ from numba.core import types
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.extending import is_jitted, overload
 
-from glider_base.errors import ConfigurationError, shown
+from glider_base.errors import ConfigurationError, raised, shown
 from glider_base.kernel import INLINED, kernel
 from glider_base.kernels.cache import BODIES, Body
 
@@ -114,10 +113,8 @@ def usable(what: str, make: Callable, *of: Any) -> Any:
         values = make(*of)
     except ConfigurationError:
         raise
-    except Exception as error:  # it may not be our code
-        inside = extract_tb(error.__traceback__)[1:2]
-        where = ''.join(f'{at.filename}, line {at.lineno}: ' for at in inside)
-        raise ConfigurationError(f'{what}: {where}{type(error).__name__}: {error}') from error
+    except (Exception, SystemExit) as error:  # it may not be our code
+        raise ConfigurationError(f'{what}: {raised(error)}') from error
     try:
         typeof(values)
     except ValueError:

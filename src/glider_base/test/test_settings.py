@@ -3,6 +3,7 @@
 """What a person reads who configured something wrong."""
 
 import math
+import re
 from typing import Annotated, Literal, NamedTuple
 
 import pydantic
@@ -222,6 +223,22 @@ def test_params_are_the_numbers_of_their_settings():
     for wrong in ({}, {'rate': 1.0, 'speed': 1.0}):
         with pytest.raises(TypeError):
             derived(TurnedParams, settings, **wrong)
+
+
+class Careless(Settings):
+    share: float = 1.0
+
+    @pydantic.field_validator('share')
+    @classmethod
+    def _divided(cls, share):
+        return 1.0 / share
+
+
+def test_what_a_validator_raises_is_named():
+    with pytest.raises(ConfigurationError) as caught:
+        validate(Careless, {'share': 0.0}, 'a.yaml')
+    said = r'a\.yaml: \S*test_settings\.py, line \d+: ZeroDivisionError: float division by zero'
+    assert re.fullmatch(said, str(caught.value))
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ from typer.testing import CliRunner
 
 import command_line
 import glider_bringup as glider
+from glider_base.frames import NO_ATTITUDE
 from glider_base.kernel import kernel, on_compiling
 from glider_base.settings import ConfigurationError
 from glider_bringup import console
@@ -42,7 +43,7 @@ from glider_guidance.method import Asked
 from glider_guidance.method import method_step as guidance_step
 from glider_mission.blocks import COLUMNS, ROW
 from glider_model.ocean.field import field_velocity
-from glider_navigation.block import NO_ATTITUDE, say
+from glider_navigation.block import say
 from glider_navigation.method import method_step as navigation_step
 
 #: Half of what is named north, east and down in the world of topics: x east, y north, z up.
@@ -750,6 +751,11 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
             run_cell(CELL.replace('return Turns(0)', 'return Turns(1 // 0)')),
             {},
             ['control.law: initial_state: <ipython-input-1>, line ', ': ZeroDivisionError: '],
+        ),
+        (
+            run_cell(CELL.replace('Level(self.k)', "exit('no licence')")),
+            {},
+            ['control.law: params: <ipython-input-1>, line ', ': SystemExit: no licence'],
         ),
         (moment_on_two_axes, {}, ['moment_on_two_axes (', 'complex128 as pitch moment']),
         (run_cell(CELL.replace('def initial', 'def first')), {}, ['LevelLaw', 'no initial_state']),

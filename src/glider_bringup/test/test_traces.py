@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from glider_base.frames import NO_ATTITUDE
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S
 from glider_bringup.engines.direct import fly_blocks
@@ -126,6 +127,17 @@ def test_memory_does_not_grow_with_the_run(monkeypatch):
     assert kept.ticks == 204 * 4000
     assert all(len(values) <= 128 for values in kept.curves.values())
     assert all(len(values) <= 65 for values in kept.samples.values())
+
+
+def test_angles_are_not_drawn_where_navigation_has_no_attitude():
+    log = make_log(100)
+    log[:, TRUTH.start + 3] = 1.0
+    log[40:60, COLUMNS['odom']][:, 3:7] = NO_ATTITUDE
+    tracer = Tracer(VEHICLE)
+    tracer.add(log)
+    for angle in ('roll', 'pitch', 'heading'):
+        assert np.all(np.isnan(tracer.result().curves[f'measured_{angle}_deg'][40:60]))
+    assert np.all(np.isfinite(tracer.result().curves['measured_depth_m'][:100]))
 
 
 def test_samples_are_simultaneous_and_end_at_the_last_tick(few_buckets):

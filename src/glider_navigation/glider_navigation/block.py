@@ -4,6 +4,7 @@
 
 from glider_base.block import Block, Said, block_tick
 from glider_base.frames import (
+    NO_ATTITUDE,
     covariance_to_wire,
     from_geodetic,
     horizontal_to_wire,
@@ -19,9 +20,6 @@ from glider_navigation.intake import is_blind, is_refusing, take_in
 from glider_navigation.method import Fix, Received, method_step
 from glider_navigation.phase import KNOWN, PHASE_NAMES
 from glider_navigation.settings import NavigationParams, NavigationSettings, NavigationState
-
-#: In the place of a quaternion: there is no attitude.
-NO_ATTITUDE = (0.0, 0.0, 0.0, 0.0)
 
 
 @kernel

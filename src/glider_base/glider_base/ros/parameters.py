@@ -27,7 +27,7 @@ from rclpy.parameter import Parameter
 
 from glider_base.errors import ConfigurationError, clipped, shown
 from glider_base.files import parse_json, parse_yaml
-from glider_base.settings import Settings, limits, mistakes, nested, validate
+from glider_base.settings import Settings, limits, made, mistakes, nested, validate
 
 SettingsT = TypeVar('SettingsT', bound=Settings)
 
@@ -146,7 +146,7 @@ def _validated(node: Node, model: type[SettingsT], leaves, values: dict[str, Any
     source = f'{node.get_name()}: parameter'
     tree = {leaf.name: _parse(leaf, values[leaf.name], source) for leaf in leaves}
     try:
-        settings = model.model_validate(nested(tree))
+        settings = made(model, nested(tree), source)
         settings.check()
         return settings
     except pydantic.ValidationError as error:

@@ -15,7 +15,7 @@ import xarray
 from xarray.plot.accessor import DataArrayPlotAccessor
 
 from glider_base.frames import (
-    euler_from_quaternion,
+    angles_if_any,
     from_geodetic,
     odometry_from_wire,
     poses_from_wire,
@@ -40,7 +40,6 @@ from glider_guidance.yo.stage import STAGE_NAMES
 from glider_mission.blocks import COLUMNS
 from glider_mission.scenario import Scenario
 from glider_model.vehicle.file import steers_by
-from glider_navigation.block import NO_ATTITUDE
 
 NED, FRD, PATH = 'NED', 'FRD', 'path'
 #: Names of numbers, and what each is.
@@ -210,15 +209,13 @@ def _turn(log, out):
     """Fill ``out``, float64[n, len(_TURNED)], from log rows, float64[n, ROW]."""
     for row in range(log.shape[0]):
         estimated = odometry_from_wire(log[row, _ODOM : _ODOM + 13])
-        angles = euler_from_quaternion(estimated.q_w, estimated.q_x, estimated.q_y, estimated.q_z)
-        if estimated[3:7] == NO_ATTITUDE:
-            angles = (np.nan, np.nan, np.nan)
+        angles = angles_if_any(estimated[3:7])
         reference = reference_from_wire(log[row, _REFERENCE : _REFERENCE + 13])
         water = water_from_wire(log[row, _CURRENT : _CURRENT + 3])
         estimate = water_from_wire(log[row, _ESTIMATE : _ESTIMATE + 3])
         true = odometry_from_wire(log[row, _TRUTH : _TRUTH + 13])
         motion = (true.p_n, true.p_e, true.p_d)
-        attitude = euler_from_quaternion(true.q_w, true.q_x, true.q_y, true.q_z)
+        attitude = angles_if_any(true[3:7])
         wrench = wrench_from_wire(log[row, _WRENCH : _WRENCH + 3])
         turned = (estimated, angles, reference, water, estimate, motion, attitude, wrench)
         put(out, row, 0, turned)
