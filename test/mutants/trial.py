@@ -320,7 +320,6 @@ def digest_of(name: str) -> str:
 
 def _ticks_of(state, params, rng) -> Iterator[bytes]:
     """Numbers of some ticks from a state with something else in it, and the state after them."""
-    from glider_base.signals import TICK_S
     from glider_bringup.engines.direct import fly
     from glider_mission.blocks import ROW
 
@@ -329,7 +328,7 @@ def _ticks_of(state, params, rng) -> Iterator[bytes]:
     if rng.random() < 0.5:  # whole numbers there tell what is in an array
         params = disturbed(params, share, rng, (bool, float))
     try:
-        after, rows, _ = fly(state, params, log, TICK_S)
+        after, rows, _ = fly(state, params, log)
     except (ArithmeticError, ValueError, IndexError) as error:
         yield type(error).__name__.encode()  # as plain Python has it where compiled code has NaN
         return

@@ -32,7 +32,6 @@ class Block(NamedTuple):
 
     wired: Wired
     settings: type[Settings]  #: with ``params()`` and ``initial_state()``
-    tick: Callable  #: kernel that fills `block_tick` for its params
     flags: tuple[str, ...] = ()  #: names of its flags
     quiet: tuple[int, ...] = ()  #: flags of which nothing needs to be reported at the beginning
     every_ns: int = 0  #: a change of the flags is reported at most once in this time
@@ -67,6 +66,17 @@ def block_tick(state, t_s, inputs, params, dt):
         Numbers of its output topics, as on the wire.
     flags : tuple of int
     """
+
+
+@kernel
+def answer(held, t_s, inputs, dt):
+    """Outputs and flags of a tick of a block that is held; where its law raises it has not moved.
+
+    To hand its state to Python and back would cost many times what the tick itself does.
+    """
+    state, outputs, flags = block_tick(held.state, t_s, inputs, held.params, dt)
+    held.state = state
+    return outputs, flags
 
 
 def optional_topics(settings: Settings) -> tuple[str, ...]:

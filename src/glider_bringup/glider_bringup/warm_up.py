@@ -14,7 +14,9 @@ from pathlib import Path
 import numpy as np
 
 import glider_bringup
+from glider_base.block import answer
 from glider_base.kernels.cache import forget_old
+from glider_base.kernels.holding import Held
 from glider_base.signals import TICK_S, Battery
 from glider_base.wiring import WHEN_SILENT, at_rest
 from glider_bringup.engines.direct import fly
@@ -33,7 +35,7 @@ from glider_mission.recording.ros.verify.every_block import verify
 from glider_mission.rules import Rules
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
-from glider_model.plant.block import PLANT, plant_move, plant_outputs
+from glider_model.plant.block import PLANT, measure_held, move_held
 from glider_model.plant.trim import solve_trim
 
 
@@ -52,18 +54,22 @@ def one_tick(number: int) -> None:
     state, params = mission_of(load_scenario())
     block, own, own_params = BLOCKS[number], state[number], params[number]
     inputs = tuple(at_rest(topic) for topic in block.wired.inputs)
+    held = Held(own, own_params)
+    held.state = held.state
+    held.set_params(own_params)
     if block.wired is PLANT.wired:
-        plant_outputs(plant_move(own, inputs, own_params, TICK_S), own_params)
+        move_held(held.held, inputs, TICK_S)
+        measure_held(held.held)
         return
-    moved, _, _ = block.tick(own, 0.0, inputs, own_params, TICK_S)
+    answer(held.held, 0.0, inputs, TICK_S)
     for order in block.orders:
-        order(moved)
+        order(own)
 
 
 def fly_one_tick() -> None:
     """One tick by the direct engine."""
     state, params = mission_of(load_scenario())
-    fly(state, params, np.zeros((1, ROW)), TICK_S)
+    fly(state, params, np.zeros((1, ROW)))
 
 
 def score_nothing() -> None:

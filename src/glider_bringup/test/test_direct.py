@@ -41,7 +41,7 @@ def flown(state, params, block_ticks=BLOCK_TICKS, most=np.inf):
     blocks, finished = [], False
     while not finished and len(blocks) < most:
         log = np.full((block_ticks, ROW), np.nan)
-        state, rows, finished = fly(state, params, log, TICK_S)
+        state, rows, finished = fly(state, params, log)
         blocks.append(log[:rows])
     return np.concatenate(blocks)
 

@@ -134,7 +134,7 @@ def tick(
 
 def flown(state: MissionState, params, ticks: int) -> tuple[MissionState, np.ndarray]:
     log = np.empty((ticks, ROW))
-    state, rows, _ = fly(state, params, log, TICK_S)
+    state, rows, _ = fly(state, params, log)
     return state, log[:rows]
 
 

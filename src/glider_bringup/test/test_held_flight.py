@@ -18,6 +18,7 @@ import pytest
 
 import glider_bringup as glider
 from glider_base.kernel import kernel
+from glider_base.ros.lockstep import block_node
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import Stop
 from glider_base.signals import TICK_NS, TICK_S
@@ -260,11 +261,11 @@ def test_a_law_that_raises_on_a_planned_route_ends_it_at_that_tick():
     assert f' at tick {score["ticks"]} ' in score['reason'] and score['ticks'] % LOOK_TICKS
 
 
-def _node_of(tick, lockstep: bool) -> SimpleNamespace:
+def _node_of(lockstep: bool) -> SimpleNamespace:
     """What a node of control needs for `BlockNode.step`, with what it has sent and told."""
     wired = SimpleNamespace(name='control', outputs=('demand', 'wrench'))
-    node = SimpleNamespace(orders={}, absent=(), passed=1, state=None, params=None, flags=None)
-    node.block = SimpleNamespace(tick=tick, wired=wired, say=None)
+    node = SimpleNamespace(orders={}, absent=(), passed=1, flags=None)
+    node.block, node.held = SimpleNamespace(wired=wired, say=None), SimpleNamespace(held=None)
     node.ticks, node.wrong, node.sent, node.told = SimpleNamespace(lockstep=lockstep), '', [], []
     node.not_finite = partial(BlockNode.not_finite, node)
     node.repeat = lambda: node.sent.append(node.said)
@@ -272,20 +273,20 @@ def _node_of(tick, lockstep: bool) -> SimpleNamespace:
     return node
 
 
-def _raises(state, t_s, inputs, params, dt):
+def _raises(held, t_s, inputs, dt):
     class Aiming(NamedTuple):
         theta: float = 0.0
         theta_dot: float = 0.0
 
     if not (1 <= round(t_s / dt) <= 2):
-        return state, ((0.0,), (0.0, 0.0)), (0,)
+        return ((0.0,), (0.0, 0.0)), (0,)
     seen = SimpleNamespace(reference=Aiming(), measured=Aiming())
     return failing_step.py_func(Called(3), seen, Failing(3, True), TICK_S)
 
 
-def _makes_nan(state, t_s, inputs, params, dt):
+def _makes_nan(held, t_s, inputs, dt):
     tau_p = (1e308, math.nan, math.nan, 1e308)[round(t_s / dt)]
-    return state, ((max(-1.0, min(1.0, tau_p)),), (tau_p, tau_p)), (0,)
+    return ((max(-1.0, min(1.0, tau_p)),), (tau_p, tau_p)), (0,)
 
 
 @pytest.mark.parametrize('lockstep', [False, True])
@@ -296,9 +297,12 @@ def _makes_nan(state, t_s, inputs, params, dt):
         (_raises, rf'{RAISED} 1 \(t = 0.1 s\)'),
     ],
 )
-def test_a_law_that_fails_ends_its_node_in_lockstep_and_else_is_not_heard(lockstep, tick, words):
+def test_a_law_that_fails_ends_its_node_in_lockstep_and_else_is_not_heard(
+    lockstep, tick, words, monkeypatch
+):
     """On board the guard, in the same process, then misses `demand`. NaN was a full roll."""
-    node = _node_of(tick, lockstep)
+    monkeypatch.setattr(block_node, 'answer', tick)
+    node = _node_of(lockstep)
     BlockNode.step(node, 0)
     with pytest.raises(Stop, match=words) if lockstep else nullcontext() as stop:
         for at in (1, 2, 3):

@@ -20,7 +20,7 @@ import pytest
 
 from glider_base.kernel import kernel
 from glider_base.signals import TICK_S, Adaptation
-from glider_bringup.engines.direct import fly_held, hold
+from glider_bringup.engines.direct import HeldMission, fly_held
 from glider_bringup.engines.flight import mission_of
 from glider_control.allocation import moments
 from glider_control.laws.backstepping import (
@@ -60,16 +60,14 @@ APPLIED, MODEL, CROSS = [5, 11], [6, 12], 13
 @kernel
 def record(held, out):
     """Fly tick by tick until the mission ends or ``out`` is full; ticks that were flown."""
-    log, params = np.empty((1, ROW)), held.params
+    log, params = np.empty((1, ROW)), held.control.params
     for tick in range(len(out)):
-        state = held.state
-        joints = state.plant.joints
-        channels = state.control.law.channels
+        joints = held.plant.state.joints
+        channels = held.control.state.law.channels
         th_p, th_q = channels.roll_theta, channels.pitch_theta
         _, finished = fly_held(held, log, TICK_S)
-        state = held.state
-        measured, channels = state.control.measured, state.control.law.channels
-        roll, pitch, polar = channels.roll, channels.pitch, params.control.polar
+        measured, channels = held.control.state.measured, held.control.state.law.channels
+        roll, pitch, polar = channels.roll, channels.pitch, params.polar
         phi, theta = measured.phi, measured.theta
         s_phi, c_phi, c_theta = math.sin(phi), math.cos(phi), math.cos(theta)
         p = measured.phi_dot - math.sin(theta) * measured.psi_dot
@@ -77,7 +75,7 @@ def record(held, out):
         r = c_phi * c_theta * measured.psi_dot - s_phi * measured.theta_dot
         speed, alpha = glide_speed(theta, measured.vertical_rate, polar)
         v2 = speed * speed
-        mass = params.control.law.mass
+        mass = params.law.mass
         side = mass * speed * r - joints.m_b * GRAVITY * c_theta * s_phi
         model_p = (
             th_p[0] + th_p[1] * side / SCALE_SIDE + th_p[2] * roll.rate.value / SCALE_ROLL_RATE
@@ -88,9 +86,7 @@ def record(held, out):
             + th_q[2] * v2 / SCALE_V2
             + th_q[3] * pitch.rate.value / SCALE_PITCH_RATE
         )
-        tau_p, tau_q = moments(
-            joints.m_b, joints.x_p, joints.mu, phi, theta, params.control.allocation
-        )
+        tau_p, tau_q = moments(joints.m_b, joints.x_p, joints.mu, phi, theta, params.allocation)
         out[tick, W] = log[0, LYAPUNOV_2]
         out[tick, 1:7] = (p, roll.k1, roll.k2, 1.0, tau_p, model_p)
         out[tick, 7:13] = (q, pitch.k1, pitch.k2, c_phi, tau_q, model_q)
@@ -105,7 +101,7 @@ def fly_unknown(changes):
     scenario = load_scenario('current_8deg', {**FLIGHT, **changes})
     state, params = mission_of(scenario)
     out = np.empty((round(scenario.duration_s / TICK_S), CROSS + 1))
-    return params.control.law, out[: record(hold(state, params), out)]
+    return params.control.law, out[: record(HeldMission(state, params).blocks, out)]
 
 
 def gains(law):

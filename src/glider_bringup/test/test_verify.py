@@ -23,7 +23,7 @@ import glider_bringup as glider
 from glider_base import wiring
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.settings import ConfigurationError
-from glider_base.signals import TICK_NS, TICK_S
+from glider_base.signals import TICK_NS
 from glider_bringup.cli import app
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
@@ -358,6 +358,8 @@ def test_a_vehicle_whose_clock_is_set_back_is_verified(altered, beginning, tmp_p
 class Sums(RecordedBlock):
     """Sums what joint_states say, as an integral does, and shows the sum at every fifth step."""
 
+    state = 0.0
+
     def run(self, stamps_ns, inputs, passed):
         sums = self.state + np.cumsum(inputs['joint_states'][:, 0])
         self.state = float(sums[-1])
@@ -376,7 +378,6 @@ def test_an_input_that_shows_only_some_steps_later_is_found_by_trying(short_run,
     series['joint_states'].values[:, 0] = draw.integers(0, 2, len(series['joint_states']))
     heard = np.maximum.accumulate(newest - draw.integers(0, 3, len(newest)))
     block, again = Sums(control, settings), Sums(control, settings)
-    block.state = again.state = 0.0
     joints = {'joint_states': series['joint_states'].values[heard]}
     said, _ = block.run(newest * TICK_NS, joints, None)
     one = series['demand'] = Series(series['demand'].codec)
@@ -627,7 +628,7 @@ def test_a_sensor_that_is_not_fitted_shows_the_same_to_every_engine(method):
     scenario = load_scenario('current_8deg', {'navigation.method': method})
     state, params = mission_of(scenario)
     log = np.zeros((20, ROW))
-    state, _, _ = fly(state, params, log, TICK_S)
+    state, _, _ = fly(state, params, log)
     navigation = RecordedBlock(NAVIGATION, scenario.navigation_settings())
     inputs = {name: log[:, COLUMNS[name]] for name in navigation.inputs}
     navigation.run(np.arange(20) * TICK_NS, inputs)

@@ -60,7 +60,6 @@ def say(saturation: int) -> Said:
 CONTROL = Block(
     WIRED,
     ControlSettings,
-    control_tick,
     flags=('saturation',),
     quiet=(0,),
     every_ns=TELL_EVERY_NS,

@@ -89,7 +89,6 @@ def say(reported: int) -> Said:
 GUARD = Block(
     WIRED,
     GuardSettings,
-    guard_tick,
     flags=('guard',),
     quiet=(0,),
     every_ns=TELL_EVERY_NS,

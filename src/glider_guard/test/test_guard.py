@@ -18,7 +18,7 @@ from glider_base.wiring import NO_ECHO, WHEN_SILENT
 from glider_guard import rows
 from glider_guard.actuators import INITIAL_FOLLOWERS, follow
 from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
-from glider_guard.block import GUARD, guard_surface, say
+from glider_guard.block import GUARD, guard_surface, guard_tick, say
 from glider_guard.guard import GuardOutput, GuardParams, GuardState, Received, guard_step
 from glider_guard.settings import GuardSettings
 from glider_model.ocean.density import pressure_at
@@ -380,7 +380,7 @@ def test_what_is_gone_while_the_guard_is_paused_is_no_lag():
                 said['pressure'] = (pressure_at(-odom[2]),)
                 said |= {'demand': tuple(DIVES), 'joint_states': tuple(DIVES), **WHEN_SILENT}
                 inputs = tuple(said[name] for name in GUARD.wired.inputs)
-                state, _, flags = GUARD.tick(state, t_s, inputs, params, TICK_S)
+                state, _, flags = guard_tick(state, t_s, inputs, params, TICK_S)
         assert flags[0] & rows.FROZEN == told
 
 

@@ -49,7 +49,6 @@ def say(stage: int, infeasible: int, no_progress: int = 0) -> Said:
 GUIDANCE = Block(
     WIRED,
     GuidanceSettings,
-    guidance_tick,
     flags=('stage', 'infeasible', 'no_progress'),
     quiet=(-1, -1, 0),
     say=say,

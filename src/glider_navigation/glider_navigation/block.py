@@ -83,7 +83,6 @@ def say(phase: int, refused: int) -> Said:
 NAVIGATION = Block(
     WIRED,
     NavigationSettings,
-    navigation_tick,
     flags=('phase', 'refused'),
     quiet=(KNOWN, 0),
     say=say,

@@ -16,13 +16,14 @@ from glider_studies import workers
 
 
 def types_of(scenario):
-    return tuple(numba.typeof(one) for one in mission_of(scenario))
+    blocks = zip(*mission_of(scenario), strict=True)
+    return tuple(tuple(map(numba.typeof, block)) for block in blocks)
 
 
 def loops():
-    """What loops are compiled for, or read from the cache: types of states and parameters."""
-    held = (signature[0].field_dict for signature in direct.fly_held.signatures)
-    return {(fields['state'], fields['params']) for fields in held}
+    """What loops are compiled for, or read from the cache: types of state and parameters."""
+    held = (signature[0].field_dict.values() for signature in direct.fly_held.signatures)
+    return {tuple(tuple(one.field_dict.values()) for one in blocks) for blocks in held}
 
 
 def test_loop_depends_on_law_and_methods_alone():

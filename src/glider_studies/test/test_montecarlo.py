@@ -20,9 +20,8 @@ import command_line
 from glider_base.frames import euler_from_quaternion
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
-from glider_base.signals import TICK_S
 from glider_bringup.door.run import chosen_scenario
-from glider_bringup.engines.direct import fly_held, held_state, hold
+from glider_bringup.engines.direct import HeldMission
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.card import fly_scored
@@ -509,11 +508,11 @@ def noisy_flight():
         'initial.east_m': 3.0,
     }
     scenario = load_scenario('current_8deg', fields)
-    held = hold(*mission_of(scenario))
+    held = HeldMission(*mission_of(scenario))
     log, truth, finished = np.empty((15000, ROW)), [], False
     for tick in range(len(log)):
-        truth.append(held_state(held).plant.motion[:7])
-        _, finished = fly_held(held, log[tick : tick + 1], TICK_S)
+        truth.append(held.state.plant.motion[:7])
+        _, finished = held.fly(log[tick : tick + 1])
     assert finished
     return scenario, log, np.array(truth)
 

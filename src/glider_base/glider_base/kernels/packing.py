@@ -64,6 +64,8 @@ def _pour(typing, held, field, values):
 
     def code(context, builder, signature, arguments):
         kind, numbers, others = values.types
+        if kind.instance_type != held.field_dict[field.literal_value]:
+            raise TypeError(f'{field.literal_value}: not of the type that it had')
         _, *parts = cgutils.unpack_tuple(builder, arguments[2], 3)
         arrays = [
             context.make_array(of)(context, builder, value=part)

@@ -11,13 +11,13 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
-from numba.core import types
 from numba.experimental import structref
 from numba.extending import overload
 
 from glider_base.frames import odometry_from_wire, water_to_wire
 from glider_base.kernel import INLINED, kernel
-from glider_base.kernels.packing import packed, pour, put
+from glider_base.kernels.holding import Held, HeldType
+from glider_base.kernels.packing import put
 from glider_base.signals import TICK_S, Joints
 from glider_base.wiring import FIELDS, publisher
 from glider_control.block import control_tick
@@ -60,57 +60,33 @@ class MissionState(NamedTuple):
     guard: GuardState
 
 
-@structref.register
-class HeldType(types.StructRef):
-    """Type of `HeldMission` in compiled code."""
-
-    @property
-    def key(self):
-        """What tells it from others: the types of its fields. numba goes by their names alone."""
-        return self._fields
-
-
-class HeldMission(structref.StructRefProxy):
-    """State and parameters of a mission, where compiled code finds them and changes them.
-
-    To hand a state to Python and back costs many times what the tick itself does.
-    """
-
-
-structref.define_boxing(HeldType, HeldMission)
-
-
-def _empty(state, params):
+def _empty(blocks):
     return SimpleNamespace()
 
 
 @overload(_empty, jit_options=INLINED)
-def _new_empty(state, params):
-    kind = HeldType([('state', state.instance_type), ('params', params.instance_type)])
-    return lambda state, params: structref.new(kind)
+def _new_empty(blocks):
+    kind = HeldType(list(zip(MissionState._fields, blocks, strict=True)))
+    return lambda blocks: structref.new(kind)
 
 
 @kernel
-def _hold(state, params):
-    held = _empty(state[0], params[0])
-    pour(held, 'state', state)
-    pour(held, 'params', params)
+def _joined(blocks):
+    held = _empty(blocks)
+    held.plant, held.current, held.navigation = blocks[0], blocks[1], blocks[2]
+    held.guidance, held.control, held.guard = blocks[3], blocks[4], blocks[5]
     return held
-
-
-def hold(state: MissionState, params: MissionParams) -> HeldMission:
-    """Have a mission held. The state that was given does not change with it."""
-    return _hold(packed(state), packed(params))
 
 
 @kernel
 def fly_held(held, log, dt):
-    """Fly until the log is full or the mission ends; rows filled, and whether it has ended.
-
-    Where a law raises, what is held has not changed.
-    """
-    in_plant, in_current, in_navigation, in_guidance, in_control, in_guard = held.params
-    plant, current, navigation, guidance, control, guard = held.state
+    """Rows filled, and whether the mission has ended; see `HeldMission.fly`."""
+    in_plant, plant = held.plant.params, held.plant.state
+    in_current, current = held.current.params, held.current.state
+    in_navigation, navigation = held.navigation.params, held.navigation.state
+    in_guidance, guidance = held.guidance.params, held.guidance.state
+    in_control, control = held.control.params, held.control.state
+    in_guard, guard = held.guard.params, held.guard.state
     current = CurrentState(current.tick, current.values.copy())  # changed where they lie
     rows, finished = 0, False
     for row in range(log.shape[0]):
@@ -141,54 +117,59 @@ def fly_held(held, log, dt):
         rows = row + 1
         if finished:
             break
-    held.state = MissionState(
-        plant=plant,
-        current=current,
-        navigation=navigation,
-        guidance=guidance,
-        control=control,
-        guard=guard,
-    )
+    held.plant.state, held.current.state, held.navigation.state = plant, current, navigation
+    held.guidance.state, held.control.state, held.guard.state = guidance, control, guard
     return rows, finished
 
 
-@kernel
-def held_state(held):
-    """What is held, a `MissionState`."""
-    return held.state
+class HeldMission:
+    """A mission in the memory of compiled code, which flies it on.
 
+    To hand a state to Python and back costs many times what the tick itself does. The state that
+    was given does not change with it.
+    """
 
-@kernel
-def _set_state(held, state):
-    pour(held, 'state', state)
+    def __init__(self, state: MissionState, params: MissionParams) -> None:
+        self._blocks, self._params = tuple(map(Held, state, params)), params
+        self.blocks = _joined(tuple(block.held for block in self._blocks))
 
+    @property
+    def state(self) -> MissionState:
+        """State between two ticks."""
+        return MissionState(*(block.state for block in self._blocks))
 
-def set_held(held: HeldMission, state: MissionState) -> None:
-    """Hold another state."""
-    _set_state(held, packed(state))
+    @state.setter
+    def state(self, state: MissionState) -> None:
+        for block, own in zip(self._blocks, state, strict=True):
+            block.state = own
 
+    def set_params(self, params: MissionParams) -> None:
+        """Fly on with other parameters."""
+        for block, own, before in zip(self._blocks, params, self._params, strict=True):
+            if own is not before:
+                block.set_params(own)
+        self._params = params
 
-@kernel
-def _set_params(held, params):
-    pour(held, 'params', params)
+    def fly(self, log: np.ndarray) -> tuple[int, bool]:
+        """Fly until the log, float64[n, ROW], is full or the mission ends.
 
-
-def set_held_params(held: HeldMission, params: MissionParams) -> None:
-    """Fly on with other parameters."""
-    _set_params(held, packed(params))
+        Returns how many rows were filled, and whether the mission has ended. Where a law raises,
+        the state has not changed.
+        """
+        return fly_held(self.blocks, log, TICK_S)
 
 
 def fly(
-    state: MissionState, params: MissionParams, log: np.ndarray, dt: float
+    state: MissionState, params: MissionParams, log: np.ndarray
 ) -> tuple[MissionState, int, bool]:
-    """Fly until the log, float64[n, ROW], is full or the mission ends, in ticks of ``dt`` s.
+    """Fly until the log, float64[n, ROW], is full or the mission ends.
 
     Returns the state after the last row that was filled in, the number of rows, and whether the
     mission has ended. Neither state nor params are changed.
     """
-    held = hold(state, params)
-    rows, finished = fly_held(held, log, dt)
-    return held_state(held), rows, finished
+    held = HeldMission(state, params)
+    rows, is_over = held.fly(log)
+    return held.state, rows, is_over
 
 
 def finite_rows(log: np.ndarray) -> int:
@@ -230,5 +211,4 @@ def blocks_of(
 
 def fly_blocks(state: MissionState, params: MissionParams) -> Iterator[np.ndarray]:
     """Fly a mission block by block; see `blocks_of`. No orders are followed."""
-    held = hold(state, params)
-    return blocks_of(lambda log: fly_held(held, log, TICK_S))
+    return blocks_of(HeldMission(state, params).fly)

@@ -12,18 +12,14 @@ import numpy as np
 from numba import typeof
 
 from glider_base.settings import ConfigurationError
-from glider_base.signals import AT_TICK, TICK_S, Battery, at_tick, raised
+from glider_base.signals import AT_TICK, Battery, at_tick, raised
 from glider_base.wiring import WHEN_SILENT
 from glider_bringup.engines.direct import (
     FlightError,
+    HeldMission,
     MissionParams,
     MissionState,
     blocks_of,
-    fly_held,
-    held_state,
-    hold,
-    set_held,
-    set_held_params,
 )
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_guidance.guidance import guidance_abort
@@ -127,23 +123,22 @@ class Held:
         pilot: Pilot | None = None,
     ) -> None:
         state, self._params = mission or mission_of(scenario)
-        self._held = hold(state, self._params)
+        self._held = HeldMission(state, self._params)
         self._scenario, self._settings = scenario, scenario.guidance_settings()
         self.past = Past(tuple(scenario.orders))
         self._pilot, self._row = pilot, None
         self._followers = [sink for sink in sinks if hasattr(sink, 'follow')]
         self._hearers = [sink for sink in sinks if hasattr(sink, 'order')]
-        fly_held(self._held, np.empty((0, ROW)), TICK_S)
+        self._held.fly(np.empty((0, ROW)))
 
     def keep(self) -> Kept:
         """All that it is at this moment."""
-        return Kept(held_state(self._held), replace(self.past))
+        return Kept(self._held.state, replace(self.past))
 
     @property
     def status(self) -> Status:
         """How the mission goes, by guidance."""
-        guidance = held_state(self._held).guidance
-        return status_of(guidance, self._settings.params(), self.past.battery)
+        return status_of(self._held.state.guidance, self._settings.params(), self.past.battery)
 
     def restore(self, kept: Kept) -> None:
         """Go on from there.
@@ -151,13 +146,13 @@ class Held:
         Raises ConfigurationError if it is of a mission with another law, other blocks, or more or
         fewer faults or parts of the current, or its orders make no sense.
         """
-        state, own = kept.mission, held_state(self._held)
+        state, own = kept.mission, self._held.state
         if typeof(state) != typeof(own) or _shapes(state) != _shapes(own):
             raise ConfigurationError(
                 'state: of another flight (allowed: of the same scenario and the same law)'
             )
         self._tell(kept.past.followed)
-        set_held(self._held, kept.mission)
+        self._held.state = kept.mission
         self.past = replace(kept.past)
 
     def order(self, order: Order) -> None:
@@ -165,7 +160,7 @@ class Held:
 
         Raises ConfigurationError if it makes no sense, now or with those to come.
         """
-        if held_state(self._held).guidance.profile.aborted:
+        if self._held.state.guidance.profile.aborted:
             raise ConfigurationError('the mission is aborted (allowed: nothing more)')
         waiting = (*self.past.waiting, order)
         check_orders(self._settings, waiting, '')
@@ -201,7 +196,7 @@ class Held:
 
     def _until_ordered(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, but not beyond where an order waits for the surface, or is a reaction."""
-        before = held_state(self._held) if len(log) > 1 else None
+        before = self._held.state if len(log) > 1 else None
         rows, is_over = self._until_raised(log)
         if before is None:
             return rows, is_over
@@ -212,14 +207,14 @@ class Held:
         astray = np.flatnonzero(self._judged_end(log[:rows])[0])
         last = min((int(at[0]) + 1 for at in (up, stays, astray) if len(at)), default=rows)
         if last < rows:  # again, and no further
-            set_held(self._held, before)
-            rows, is_over = fly_held(self._held, log[:last], TICK_S)
+            self._held.state = before
+            rows, is_over = self._held.fly(log[:last])
         return rows, is_over
 
     def _until_raised(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, or a part of it, if a law raises in the rest; a FlightError, if at once."""
         try:
-            return fly_held(self._held, log, TICK_S)
+            return self._held.fly(log)
         except Exception as error:
             if len(log) > 1:
                 return self._until_raised(log[: len(log) // 2])
@@ -247,8 +242,8 @@ class Held:
         self.past.waiting = tuple(one for one in self.past.waiting if one is not order)
         if order.abort:
             self.past.waiting = ()
-            state = held_state(self._held)
-            set_held(self._held, state._replace(guidance=guidance_abort(state.guidance)))
+            state = self._held.state
+            self._held.state = state._replace(guidance=guidance_abort(state.guidance))
             return
         given = not any(one is order for one in self.past.own)
         try:
@@ -271,7 +266,8 @@ class Held:
         outside = tuple(order for order, given in followed if given)
         ends = self._scenario.with_orders(outside).plant_settings().ends()
         plant = self._params.plant._replace(**ends)
-        set_held_params(self._held, self._params._replace(guidance=settings.params(), plant=plant))
+        params = self._params._replace(guidance=settings.params(), plant=plant)
+        self._held.set_params(params)
 
 
 def ended(complete: bool, reason: str) -> str:

@@ -20,4 +20,4 @@ def current_tick(state, t_s, inputs, params, dt):
     return state, (water_to_wire(water),), ()
 
 
-CURRENT = Block(WIRED, CurrentSettings, current_tick)
+CURRENT = Block(WIRED, CurrentSettings)

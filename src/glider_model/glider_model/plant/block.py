@@ -30,4 +30,16 @@ def plant_move(state, inputs, params, dt):
     return plant_step(state, target, water_from_wire(water), params, dt, drop[0] > 0.5)
 
 
-PLANT = Block(WIRED, PlantSettings, plant_move, ('finished',), steers_by=steers_by)
+@kernel
+def measure_held(held):
+    """`plant_outputs` of a plant that is held."""
+    return plant_outputs(held.state, held.params)
+
+
+@kernel
+def move_held(held, inputs, dt):
+    """Have a plant that is held do `plant_move`."""
+    held.state = plant_move(held.state, inputs, held.params, dt)
+
+
+PLANT = Block(WIRED, PlantSettings, ('finished',), steers_by=steers_by)

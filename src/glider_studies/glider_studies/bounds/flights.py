@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from glider_base.signals import TICK_S
-from glider_bringup.engines.direct import fly_held, hold, set_held_params
+from glider_bringup.engines.direct import HeldMission
 from glider_bringup.engines.flight import mission_of
 from glider_mission.blocks import COLUMNS, ROW
 from glider_studies.bounds.certificate import Gain, Region
@@ -58,7 +58,7 @@ def fly_start(glide: Glide, aside: float, turned: float) -> np.ndarray:
     north, east = north + aside * math.sin(course), east - aside * math.cos(course)
     params = straight_on(glide.params, north, east, course)
     log = np.empty((_ticks(glide), ROW))
-    rows, _ = fly_held(hold(glide.state, params), log, TICK_S)
+    rows, _ = HeldMission(glide.state, params).fly(log)
     return np.abs(log[:rows, _ASIDE])
 
 
@@ -123,11 +123,11 @@ def _water(glide: Glide, heading: float, speed: float):
 
 def _jumping(glide: Glide, params, waters, random: np.random.Generator) -> Iterator[np.ndarray]:
     """Log of each stay of the water."""
-    held, side = hold(glide.state, params), int(random.integers(2))
+    held, side = HeldMission(glide.state, params), int(random.integers(2))
     left = _ticks(glide._replace(left_s=glide.left_s - LEAD_S))
     while left > 0:
-        set_held_params(held, params._replace(current=waters[side]))
+        held.set_params(params._replace(current=waters[side]))
         log = np.empty((min(left, round(random.uniform(*STAYS_S) / TICK_S)), ROW))
-        rows, is_over = fly_held(held, log, TICK_S)
+        rows, is_over = held.fly(log)
         yield log[:rows]
         left, side = 0 if is_over else left - rows, 1 - side

@@ -13,15 +13,7 @@ import numpy as np
 
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S, Reference, TrackingError, Water
-from glider_bringup.engines.direct import (
-    HeldMission,
-    MissionParams,
-    MissionState,
-    fly_held,
-    held_state,
-    hold,
-    set_held_params,
-)
+from glider_bringup.engines.direct import HeldMission, MissionParams, MissionState
 from glider_bringup.engines.flight import mission_of
 from glider_control.control import see
 from glider_control.law import Seen, bank_carefully, law_step
@@ -100,7 +92,7 @@ def straight_on(params: MissionParams, north: float, east: float, course: float)
 def _stage(held: HeldMission, ticks: int) -> int:
     """Stage of the yo after some ticks."""
     log = np.empty((ticks, ROW))
-    rows, is_over = fly_held(held, log, TICK_S)
+    rows, is_over = held.fly(log)
     return -1 if is_over else int(log[rows - 1, COLUMNS['stage']])
 
 
@@ -109,7 +101,7 @@ def glides(vehicle: str) -> dict[str, Glide]:
     load_vehicle(vehicle)  # what is wrong with it is named in its own words
     scenario = scenario_of(vehicle)
     state, params = mission_of(scenario)
-    held = hold(state, params)
+    held = HeldMission(state, params)
     found, before, dives, t_s = {}, -1, 0, 0.0
     began_s: dict[int, float] = {}
     lengths: dict[int, float] = {}
@@ -135,13 +127,13 @@ def glides(vehicle: str) -> dict[str, Glide]:
 
 def _settled(held, scenario, params, stage, leg_s, gone_s) -> Glide:
     """Fly straight on until the glide is steady; the mission goes on from there."""
-    guidance = held_state(held).guidance
+    guidance = held.state.guidance
     place = guidance.gate.odometry
     course = guidance.commanded.heading_command
     params = straight_on(params, place.p_n, place.p_e, course)
-    set_held_params(held, params)
+    held.set_params(params)
     _stage(held, round(STRAIGHT_S / TICK_S))
-    state = held_state(held)
+    state = held.state
     return Glide(
         scenario=scenario,
         state=state,

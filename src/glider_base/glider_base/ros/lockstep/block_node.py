@@ -4,14 +4,16 @@
 
 import math
 import time
+from typing import NamedTuple
 
 from pydantic import Field
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
-from glider_base.block import Block, Said, Telling, optional_topics
+from glider_base.block import Block, Said, Telling, answer, optional_topics
 from glider_base.errors import EXIT_FAILED
 from glider_base.kernel import on_compiling
+from glider_base.kernels.holding import Held
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.node import TickSettings
 from glider_base.ros.lockstep.peers import FAREWELL_S
@@ -68,11 +70,16 @@ class BlockNode(StepNode, LifecycleNodeMixin):
     def forget(self) -> None:
         """Know nothing, as at the start."""
         super().forget()
-        self.state = self.settings.initial_state()
+        self.held = Held(self.settings.initial_state(), self.params)
         self.telling = Telling(self.block)
         self.flags: tuple[int, ...] | None = None  #: of the last answer
         self.said: tuple[int, tuple] = (0, ())  #: its stamp, and the numbers
         self.wrong = ''  #: why there is none, in words
+
+    @property
+    def state(self) -> NamedTuple:
+        """State of the block."""
+        return self.held.state
 
     def on_ready(self) -> None:
         """Begin, or offer the services of a managed node."""
@@ -96,7 +103,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         self.forget()
         self.event(self._newest_ns(), health.OK, health.CONFIGURED)
         if self.orders.keys() & {health.ABORT, health.SURFACE}:
-            self.state = self.block.surface(self.state)
+            self.held.state = self.block.surface(self.state)
         return TransitionCallbackReturn.SUCCESS
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -122,6 +129,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         self.orders.setdefault(health.PARAMETERS_SET, {}).update(changed)
         self.settings = settings
         self.params = settings.params()
+        self.held.set_params(self.params)
 
     def compile_kernels(self) -> None:
         """Call every kernel once, so that no tick waits for the compiler."""
@@ -132,18 +140,21 @@ class BlockNode(StepNode, LifecycleNodeMixin):
             self.get_logger().info(said)
 
         with on_compiling(tell):
-            state, _, _ = self.block.tick(self.state, 0.0, inputs, self.params, TICK_S)
+            state = self.state
+            answer(self.held.held, 0.0, inputs, TICK_S)
+            self.held.set_params(self.params)
+            self.held.state = state
             for order in self.block.orders:
                 order(state)
 
     def surface(self, order: str) -> None:
         """Ask for the surface, for good; ``order`` says on /diagnostics who wanted it."""
-        self.state = self.block.surface(self.state)
+        self.held.state = self.block.surface(self.state)
         self.orders.setdefault(order, {})
 
     def clear(self) -> None:
         """Forget what has latched."""
-        self.state = self.block.clear(self.state)
+        self.held.state = self.block.clear(self.state)
         self.orders.setdefault(health.CLEAR, {})
 
     def step(self, stamp_ns: int, *inputs: tuple[float, ...]) -> None:
@@ -156,9 +167,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
             inputs = (*inputs[:place], values, *inputs[place:])
         for tick in range(stamp_ns // TICK_NS + 1 - self.passed, stamp_ns // TICK_NS + 1):
             try:
-                self.state, outputs, self.flags = self.block.tick(
-                    self.state, tick * TICK_S, inputs, self.params, TICK_S
-                )
+                outputs, self.flags = answer(self.held.held, tick * TICK_S, inputs, TICK_S)
                 wrong = self.not_finite(outputs, tick)
             except Exception as error:  # of a law of somebody's own
                 outputs, wrong = (), at_tick(raised(error), tick)
