@@ -56,7 +56,6 @@ def one_tick(number: int) -> None:
     inputs = tuple(at_rest(topic) for topic in block.wired.inputs)
     held = Held(own, own_params)
     held.state = held.state
-    held.set_params(own_params)
     if block.wired is PLANT.wired:
         move_held(held.held, inputs, TICK_S)
         measure_held(held.held)

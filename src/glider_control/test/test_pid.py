@@ -7,11 +7,13 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rclpy.parameter import Parameter
 
 from glider_base.signals import TICK_S, Reference
 from glider_control.heading import HEADING_INTEGRAL_MAX, heading_to_roll
 from glider_control.law import Seen
-from glider_control.laws.pid import PidState, pid_step
+from glider_control.laws.pid import PidSettings, PidState, pid_step
+from glider_control.nodes.control_node import ControlNode
 from glider_control.settings import ControlSettings
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import Filtered
@@ -191,3 +193,25 @@ def test_mirrored_vehicle_is_controlled_in_the_mirror(phi, psi, p, r, w):
         -state.heading_integral,
         -state.roll.value,
     )
+
+
+def test_a_parameter_of_which_a_law_makes_nothing_is_refused_and_its_node_flies_on(
+    context, monkeypatch
+):
+    """As one of somebody's own may; on board the guard is in the same process."""
+    overrides = [Parameter('lockstep', value=False), Parameter('law', value='pid')]
+    node = ControlNode(context=context, parameter_overrides=overrides)
+    try:
+        params = node.params
+
+        def divided(law, vehicle, bank):
+            return params.law if law.pitch_kp != 5.0 else 1 / 0
+
+        monkeypatch.setattr(PidSettings, 'params', divided)
+        said = node.set_parameters_atomically([Parameter('pid.pitch_kp', value=5.0)])
+        assert not said.successful and 'ZeroDivisionError' in said.reason
+        assert node.settings.pid.pitch_kp != 5.0 and node.params == params
+        assert node.set_parameters_atomically([Parameter('pid.pitch_kp', value=6.0)]).successful
+    finally:
+        node.close()
+        node.destroy_node()

@@ -66,7 +66,7 @@ class RecordedBlock:
     def tune(self, settings: Settings) -> None:
         """Fly on with other settings."""
         self.settings = settings
-        self._held.set_params(settings.params())
+        self._held = Held(self.state, settings.params())
 
     def surface(self) -> None:
         """Do what it does when the surface is asked for."""

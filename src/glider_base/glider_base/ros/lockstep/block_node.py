@@ -47,7 +47,10 @@ class BlockNode(StepNode, LifecycleNodeMixin):
     def __init__(self, block: Block, **kwargs) -> None:
         super().__init__(block.wired.node, **kwargs)
         self.block = block
-        self.settings = declare_settings(self, block.settings, self.on_settings)
+        # what params make of a law of somebody's own may raise: not once it has been taken
+        self.settings = declare_settings(
+            self, block.settings, self.on_settings, lambda settings: settings.params()
+        )
         self.steers_by = block.steers_by(self.settings)
         topics = optional_topics(self.settings)
         outputs = present(block.wired.outputs, topics)
@@ -129,7 +132,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         self.orders.setdefault(health.PARAMETERS_SET, {}).update(changed)
         self.settings = settings
         self.params = settings.params()
-        self.held.set_params(self.params)
+        self.held = Held(self.state, self.params)
 
     def compile_kernels(self) -> None:
         """Call every kernel once, so that no tick waits for the compiler."""
@@ -142,7 +145,6 @@ class BlockNode(StepNode, LifecycleNodeMixin):
         with on_compiling(tell):
             state = self.state
             answer(self.held.held, 0.0, inputs, TICK_S)
-            self.held.set_params(self.params)
             self.held.state = state
             for order in self.block.orders:
                 order(state)
