@@ -155,16 +155,13 @@ def _validated(node: Node, model: type[SettingsT], leaves, values: dict[str, Any
 
 
 def declare_settings(
-    node: Node,
-    model: type[SettingsT],
-    on_change: Callable[[SettingsT], None] | None = None,
-    fit: Callable[[SettingsT], Any] = lambda settings: None,
+    node: Node, model: type[SettingsT], on_change: Callable[[SettingsT], None] | None = None
 ) -> SettingsT:
     """Declare the parameters of ``model`` on ``node`` and return the values they were given.
 
     ``on_change`` is called with the new settings after a tunable parameter was set at run time. A
-    set that the model refuses as a whole, or ``fit`` by a ConfigurationError, is rejected and
-    changes nothing. A ConfigurationError names the parameter, its value and the allowed range.
+    set that the model refuses as a whole is rejected and changes nothing. A ConfigurationError
+    names the parameter, its value and the allowed range.
     """
     leaves = list(_leaves(model, None))
     for leaf in leaves:
@@ -181,7 +178,7 @@ def declare_settings(
     def check(parameters: list[Parameter]) -> SetParametersResult:
         changed = {item.name: item.value for item in parameters if item.name in names}
         try:
-            fit(_validated(node, model, leaves, {**current(), **changed}))
+            _validated(node, model, leaves, {**current(), **changed})
         except ConfigurationError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

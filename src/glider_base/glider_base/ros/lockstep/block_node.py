@@ -47,10 +47,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
     def __init__(self, block: Block, **kwargs) -> None:
         super().__init__(block.wired.node, **kwargs)
         self.block = block
-        # what params make of a law of somebody's own may raise: not once it has been taken
-        self.settings = declare_settings(
-            self, block.settings, self.on_settings, lambda settings: settings.params()
-        )
+        self.settings = declare_settings(self, block.settings, self.on_settings)
         self.steers_by = block.steers_by(self.settings)
         topics = optional_topics(self.settings)
         outputs = present(block.wired.outputs, topics)
