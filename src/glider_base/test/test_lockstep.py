@@ -14,6 +14,8 @@ import pytest
 import rclpy.clock
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import SetParameters
 from rclpy.executors import ExternalShutdownException
 from rclpy.parameter import Parameter
@@ -680,6 +682,20 @@ def test_parameter_that_there_is_not_is_refused_by_its_name(make_graph, context)
     (result,) = future.result().results
     assert not result.successful
     assert result.reason.startswith('control_node: parameter nonsense: unknown (allowed: ')
+
+
+def test_parameter_of_a_type_that_there_is_not_ends_no_node(make_graph, context):
+    """It ended autopilot, and the guard with it."""
+    graph = make_graph(lockstep=False)
+    client_node = rclpy.create_node('client', namespace='/glider', context=context)
+    graph.nodes.append(client_node)
+    graph.executor.add_node(client_node)
+    client = client_node.create_client(SetParameters, f'{CONTROL}/set_parameters')
+    assert graph.spin(client.service_is_ready) is None
+    strange = ParameterMessage(name='pid.pitch_kp', value=ParameterValue(type=77))
+    future = client.call_async(SetParameters.Request(parameters=[strange]))
+    assert graph.spin(future.done) is None
+    assert not future.result().results
 
 
 @pytest.mark.parametrize(

@@ -37,7 +37,7 @@ from glider_base.ros.wire import qos, topics
 from glider_base.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, Topic, topic_of
 from glider_base.settings import Settings, number
-from glider_base.signals import TICK_NS, not_finite
+from glider_base.signals import TICK_NS, not_finite, raised
 from glider_base.wiring import WHEN_SILENT
 
 #: A node looks for its peers this often (s), and after a while in so small a share of its wait.
@@ -128,6 +128,23 @@ class TickNode(Node):
         if msg_type is ClockMessage and not kwargs.get('raw'):
             callback = partial(self._on_time, Input(TOPICS['/clock'], False), callback)
         return super().create_subscription(msg_type, topic, callback, *args, **kwargs)
+
+    def create_service(self, srv_type, srv_name, callback, **kwargs):
+        """Offer a service; a request that it fails at is logged and ends no node.
+
+        rclpy fails at a parameter of a type that there is not.
+        """
+
+        def serve(request, response):
+            try:
+                return callback(request, response)
+            except Stop:
+                raise
+            except Exception as error:
+                self.get_logger().error(f'{srv_name}: request refused: {raised(error)}')
+                return response
+
+        return super().create_service(srv_type, srv_name, serve, **kwargs)
 
     def _on_time(self, item: Input, take: Callable, message: ClockMessage) -> None:
         """Let rclpy take the time."""
