@@ -50,6 +50,12 @@ class Example(Settings):
     legs: list[tuple[float, float]] = [(0.0, 1.0)]
     gains: Gains = Gains()
 
+    def params(self) -> float:
+        """Of somebody's own law: of one gain it makes none."""
+        if self.gains.kp == 7.0:
+            raise ConfigurationError('params: division by zero')
+        return self.gains.kp
+
 
 @pytest.fixture(scope='module')
 def context():
@@ -239,7 +245,8 @@ def test_tunable_parameter_reaches_the_node(make_node):
 
 
 @pytest.mark.parametrize(
-    ('name', 'value'), [('gain', 0.5), ('gains.kp', 11.0), ('gains.kp', 0.25), ('gains.kp', 'x')]
+    ('name', 'value'),
+    [('gain', 0.5), ('gains.kp', 11.0), ('gains.kp', 0.25), ('gains.kp', 'x'), ('gains.kp', 7.0)],
 )
 def test_refused_change_changes_nothing(make_node, name, value):
     node, seen = make_node(), []

@@ -160,8 +160,8 @@ def declare_settings(
     """Declare the parameters of ``model`` on ``node`` and return the values they were given.
 
     ``on_change`` is called with the new settings after a tunable parameter was set at run time. A
-    set that the model refuses as a whole is rejected and changes nothing. A ConfigurationError
-    names the parameter, its value and the allowed range.
+    set that the model refuses as a whole, or of which it makes no params, is rejected and changes
+    nothing. A ConfigurationError names the parameter, its value and the allowed range.
     """
     leaves = list(_leaves(model, None))
     for leaf in leaves:
@@ -178,7 +178,7 @@ def declare_settings(
     def check(parameters: list[Parameter]) -> SetParametersResult:
         changed = {item.name: item.value for item in parameters if item.name in names}
         try:
-            _validated(node, model, leaves, {**current(), **changed})
+            _validated(node, model, leaves, {**current(), **changed}).params()
         except ConfigurationError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
