@@ -163,6 +163,10 @@ def test_lost_input_surfaces_the_vehicle_for_good(flight):
     assert set(vehicle.commands[before:]) == {SAFE}
     flight.until(lambda: vehicle.said('surface: ordered to the surface'))
     assert flight.guard.state.reported & ORDERED
+    vehicle.told.clear()
+    vehicle.says = {}
+    flight.until(lambda: 'missing or stale' in flight.guard.condition().message)
+    assert flight.guard.condition().message.endswith('; surfacing for good')
 
 
 def test_nothing_is_cleared_while_nobody_knows_how_deep_the_vehicle_is(context, monkeypatch):

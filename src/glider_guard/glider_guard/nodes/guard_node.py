@@ -14,6 +14,7 @@ from glider_base.wiring import at_rest
 from glider_guard.ascent import INITIAL_ASCENT, Rise, come_up
 from glider_guard.block import GUARD, is_seen_up
 from glider_guard.depth import late_s
+from glider_guard.rows import SURFACE, reaction_of
 from glider_guard.witness import AFLOAT_M, SURFACE_M
 
 
@@ -59,8 +60,8 @@ class GuardNode(BlockNode):
     @property
     def when_stale(self) -> str:
         """What the node does while an input is stale."""
-        is_lost = health.SURFACE in self.orders
-        return 'surfacing for good' if is_lost else 'commanding the safe state until then'
+        is_for_good = reaction_of(self.state.reported) >= SURFACE
+        return 'surfacing for good' if is_for_good else 'commanding the safe state until then'
 
     @property
     def sample_period_s(self) -> float:
