@@ -727,7 +727,7 @@ def test_bag_of_others_needs_settings_and_a_topic_of_ours(
     (like,) = short_run.glob('*.mcap')
     file = tmp_path / 'theirs.mcap'
     write_bag(file, like, recorded, attachments=False)
-    with pytest.raises(ConfigurationError, match='give --settings'):
+    with pytest.raises(ConfigurationError, match='put one there, or give --settings'):
         verified(file, tmp_path)
     assert verified(file, tmp_path, settings=short_run / 'scenario.yaml')['identical']
     with pytest.raises(ConfigurationError, match=r'allowed: /glider'):

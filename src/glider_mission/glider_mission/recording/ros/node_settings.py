@@ -64,7 +64,7 @@ def read_settings(bag: Bag, path: Path, file: Path | None, scratch: Path) -> Nod
         return _from_parameters(read_yaml(parameters), str(parameters))
     raise ConfigurationError(
         f'{path}: it does not say what the nodes were told, neither {SCENARIO_FILE} nor '
-        f'{PARAMETERS_FILE} is in it or attached: give --settings FILE'
+        f'{PARAMETERS_FILE} is in it or attached: put one there, or give --settings FILE to verify'
     )
 
 
