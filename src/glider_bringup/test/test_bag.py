@@ -20,6 +20,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from glider_base.ros.lockstep import health
+from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
@@ -27,7 +28,9 @@ from glider_base.signals import TICK_NS
 from glider_bringup.nodes.recorder_node import RecorderNode
 from glider_bringup.scoring.traces import TRACED
 from glider_mission.blocks import BLOCK_TICKS, COLUMNS
+from glider_mission.disk import DiskError
 from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.mcap_writer import McapWriter
 from glider_mission.recording.ros import recorded_log
 from glider_mission.recording.ros.recorded_log import SCORED, RecordedLog
 from glider_mission.recording.ros.rosbag2 import (
@@ -151,6 +154,20 @@ def test_recorder_with_a_misspelt_parameter_leaves_no_file_in_the_way(context, t
     overrides = [Parameter(name, value=value) for name, value in given.items()]
     with pytest.raises(ConfigurationError, match='nmae: unknown'):
         RecorderNode(context=context, parameter_overrides=overrides)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_recorder_that_begins_on_a_full_disk_leaves_no_file_in_the_way(
+    context, tmp_path, monkeypatch
+):
+    def fail(_):
+        raise DiskError('the disk is full')
+
+    monkeypatch.setattr(McapWriter, 'flush', fail)
+    overrides = [Parameter('folder', value=str(tmp_path))]
+    with pytest.raises(Stop, match='the disk is full') as stop:
+        RecorderNode(context=context, parameter_overrides=overrides)
+    assert stop.value.code == 1
     assert list(tmp_path.iterdir()) == []
 
 

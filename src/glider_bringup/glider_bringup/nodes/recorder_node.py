@@ -77,6 +77,8 @@ class RecorderNode(TickNode):
                 recorded,
                 sync=self.settings.sync,
             )
+        except DiskError as error:
+            raise Stop(EXIT_FAILED, str(error)) from None
         except OSError as error:
             raise ConfigurationError(f'{error.filename}: {error.strerror}') from None
         strange = {'fix', *GUARD.outputs}  # may be stamped by another clock

@@ -17,6 +17,7 @@ from rclpy.qos import QoSProfile
 
 from glider_base.ros.wire.topics import TOPICS, Topic, message_class
 from glider_base.signals import TICK_NS
+from glider_mission.disk import DiskError
 from glider_mission.recording.bag_files import (
     METADATA_FILE,
     ROSBAG2,
@@ -134,7 +135,11 @@ class BagWriter:
             self._channels[topic.name] = number
         for path, data in attached:
             self._mcap.add_attachment(path.name, 'application/yaml', data)
-        self.flush()
+        try:
+            self.flush()
+        except DiskError:
+            file.unlink(missing_ok=True)  # nothing is in it, and it would be in the way
+            raise
 
     def write(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Add a serialized message."""
