@@ -11,6 +11,8 @@ import sys
 import time
 from collections import defaultdict
 from contextlib import ExitStack
+from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from mcap.reader import make_reader
@@ -21,6 +23,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
+from glider_bringup.nodes import viewer_node
 
 DEADLINE_S = 200.0
 RECORDED = {topic.full_name('/glider'): topic for topic in recorded_topics(['measured_odom'])}
@@ -163,6 +166,16 @@ def check_refused(done, out, *words) -> None:
     for word in words:
         assert word in done.stderr
     assert not out.exists()
+
+
+def test_bytes_that_are_no_message_are_not_shown(monkeypatch):
+    came, shown = [b'\0\1\0\0', bytes(12), None], []
+    monkeypatch.setattr(viewer_node, 'take', lambda _: came.pop(0))
+    channel = SimpleNamespace(log=lambda raw, log_time: shown.append((raw, log_time)))
+    node = SimpleNamespace(asked=[], incoming={'odom': None}, held={}, channels={'odom': channel})
+    node.send = partial(viewer_node.ViewerNode.send, node)
+    viewer_node.ViewerNode.pass_on(node)
+    assert shown == [(bytes(12), 0)]
 
 
 def test_port_that_is_taken_is_named_before_the_flight(glider, tmp_path):

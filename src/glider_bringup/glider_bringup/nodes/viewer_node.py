@@ -120,6 +120,8 @@ class ViewerNode(Node):
                 self.send(name, raw)
         for name, subscription in self.incoming.items():
             while (raw := take(subscription)) is not None:
+                if len(raw) < _STAMP.size:
+                    continue  # bytes that are no message
                 if name in self.held:
                     self.held[name].append(raw)
                 self.send(name, raw)
