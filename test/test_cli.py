@@ -207,6 +207,7 @@ MISTAKES = [
     (['score', '.'], ['not a run folder']),
     (['autopilot', 'helix', '--ros-args', '-r', '__ns:=/a'], ['__ns:=/a', '--namespace']),
     (['autopilot', 'helix', '--ros-args', '-r', '__node:=a'], ['__node:=a', 'by their names']),
+    (['autopilot', 'helix', '--ros-args', '-r', '__name:=a'], ['__name:=a', 'by their names']),
 ]
 
 

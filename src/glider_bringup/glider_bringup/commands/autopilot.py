@@ -63,7 +63,7 @@ def autopilot(
     for word in called.args:
         if '__ns:=' in word:  # rcl goes by the first one that it is given
             raise ConfigurationError(f'{word}: not here (allowed: --namespace)')
-        if '__node:=' in word:  # it would have no parameters, and wait for a recorder
+        if '__node:=' in word or '__name:=' in word:  # they would have no parameters
             raise ConfigurationError(f'{word}: not here (allowed: the nodes by their names)')
     flown = load_scenario(scenario, chosen_fields(changed_fields(changes), controller))
     reckons = 'measured_odom' not in flown.navigation.topics if navigation is None else navigation
