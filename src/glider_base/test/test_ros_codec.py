@@ -203,6 +203,10 @@ def test_missing_joint_is_named():
     message = JointState(name=['buoyancy_engine', 'roll_mass'], position=[0.0, 0.0])
     with pytest.raises(MessageError, match="'pitch_mass' is missing"):
         COMMAND.decode(serialize_message(message))
+    message.name = 200_000 * ['x']
+    with pytest.raises(MessageError) as error:
+        COMMAND.decode(serialize_message(message))
+    assert len(str(error.value)) < 200  # it stands on /diagnostics, once a second
 
 
 def test_joint_without_position_is_named():

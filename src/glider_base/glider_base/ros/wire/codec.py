@@ -19,6 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from rclpy.serialization import deserialize_message
 
+from glider_base.errors import shown
+
 _SECOND_NS, _STAMP = 1_000_000_000, struct.Struct('<iI')
 _CDR_HEADER = b'\x00\x01\x00\x00'  #: of little-endian bytes, which are aligned from behind it on
 #: Fields that name frames.
@@ -299,7 +301,7 @@ def _split(message, path: str) -> tuple[str, int | None]:
     if not joint or joint.isdigit():
         return name, int(joint) if joint else None
     if joint not in names:
-        raise MessageError(f'joint {joint!r} is missing; the message has {names}')
+        raise MessageError(f'joint {joint!r} is missing; the message has {shown(names)}')
     return name, names.index(joint)
 
 
