@@ -9,6 +9,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.lifecycle import TransitionCallbackReturn
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
@@ -18,6 +19,7 @@ from glider_base.ros.lockstep import health
 from glider_base.ros.wire import qos
 from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS
+from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 from glider_base.wiring import at_rest
 from glider_control.nodes.control_node import ControlNode
@@ -248,6 +250,23 @@ def test_control_that_is_configured_again_counts_anew_what_it_refuses(context):
         node.publish_event = told.append
         node.tell(10**9, (0,))
         assert len(told) == 1  # and not that none was refused
+    finally:
+        node.close()
+        node.destroy_node()
+
+
+def test_a_node_that_cannot_be_configured_says_why(context, monkeypatch):
+    """rclpy says that it failed, and no more."""
+    node, told = ControlNode(context=context), []
+
+    def fail(_):
+        raise ConfigurationError('control.law: initial_state: division by zero')
+
+    monkeypatch.setattr(type(node.settings), 'initial_state', fail)
+    try:
+        node.event = lambda stamp_ns, level, said: told.append(said)
+        assert node.on_configure(None) == TransitionCallbackReturn.FAILURE
+        assert told == ['not configured: control.law: initial_state: division by zero']
     finally:
         node.close()
         node.destroy_node()

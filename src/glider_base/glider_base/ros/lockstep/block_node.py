@@ -20,7 +20,7 @@ from glider_base.ros.lockstep.peers import FAREWELL_S
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.parameters import changed_parameters, declare_settings
-from glider_base.settings import Settings
+from glider_base.settings import ConfigurationError, Settings
 from glider_base.signals import TICK_NS, TICK_S, at_tick, not_finite, raised
 from glider_base.wiring import at_rest, not_fitted, present
 
@@ -100,7 +100,11 @@ class BlockNode(StepNode, LifecycleNodeMixin):
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Start from nothing, but for an order to come up."""
-        self.forget()
+        try:
+            self.forget()
+        except ConfigurationError as error:  # of a law of somebody's own
+            self.event(self._newest_ns(), health.ERROR, f'not configured: {error}')
+            return TransitionCallbackReturn.FAILURE
         self.event(self._newest_ns(), health.OK, health.CONFIGURED)
         if self.orders.keys() & {health.ABORT, health.SURFACE}:
             self.held.state = self.block.surface(self.state)
