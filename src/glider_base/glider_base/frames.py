@@ -282,8 +282,12 @@ class OriginSettings(Settings):
             moment = datetime.fromisoformat(text.replace('Z', '+00:00')) if text else None
             if moment is not None and moment.tzinfo is not None:
                 moment = moment.astimezone(UTC).replace(tzinfo=None)
+            if moment is not None and not 1900 <= moment.year < 2200:
+                raise ValueError
         except (ValueError, OverflowError):
-            raise ValueError('not a time (allowed: as 2026-03-01 or 2026-03-01T06:00Z)') from None
+            raise ValueError(
+                'not a time (allowed: as 2026-03-01 or 2026-03-01T06:00Z, of 1900 to 2199)'
+            ) from None
         return '' if moment is None else f'{moment.isoformat()}Z'
 
     @property

@@ -134,6 +134,8 @@ def test_orders_may_be_in_degrees():
          'other places than waypoints_latlon'),
         ({'origin': {'time': 'yesterday'}}, r"origin.time = 'yesterday': not a time \(allowed: "),
         ({'origin': {'time': '0001-01-01T00:00+09:00'}}, r'not a time \(allowed: '),
+        ({'origin': {'time': '9999-12-31T23:00'}}, r'not a time \(allowed: .*, of 1900 to 2199\)'),
+        ({'origin': {'time': '1026-03-01'}}, r'not a time \(allowed: .*, of 1900 to 2199\)'),
         ({'origin': {'time': 'now'}, 'path': {'kind': 'waypoints', 'waypoints_latlon': FIJI}},
          r'^[^\n]*origin.time = .now.: not a time[^\n]*$'),
         ({'path': {'kind': 'waypoints', 'waypoints_latlon': [[10, 0], [10, 0]]}},

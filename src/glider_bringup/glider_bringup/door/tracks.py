@@ -90,7 +90,9 @@ def start_of(scenario: Scenario, start: str | None) -> float | None:
         except ValueError:
             own = ''
         if not own:
-            raise ConfigurationError(f'--start {start}: not a time (allowed: as 2026-03-01T06:00)')
+            raise ConfigurationError(
+                f'--start {start}: not a time (allowed: as 2026-03-01T06:00, of 1900 to 2199)'
+            )
     return datetime.fromisoformat(own.replace('Z', '+00:00')).timestamp() if own else None
 
 
