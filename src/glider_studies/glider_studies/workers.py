@@ -24,6 +24,7 @@ import typer
 from distributed import Client, Future, LocalCluster, TimeoutError, wait
 from distributed.client import ClosedClientError
 from distributed.comm import get_address_host_port
+from distributed.protocol.pickle import dumps, loads
 from distributed.scheduler import KilledWorker
 
 from glider_base.errors import EXIT_FAILED, EXIT_INTERRUPTED, ConfigurationError
@@ -70,10 +71,11 @@ def dask_setup(worker: Any = None) -> None:
         logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
-def _call(code: str, function: Callable, task: Any) -> Any:
-    """What a function returns for a task, in a worker with the same program."""
+def _call(code: str, work: bytes) -> Any:
+    """What a function returns for a task, both pickled, in a worker with the same program."""
     if code != source_digest():
         raise WorkError(f'the worker on {gethostname()} has another version of the program')
+    function, task = loads(work)
     return function(task)
 
 
@@ -141,7 +143,7 @@ class Pool:
                 with _scheduler_answers():
                     threads = self.threads()
                     for task in islice(tasks, max(0, ahead * max(threads, 1) - len(flying))):
-                        call = _call, source_digest(), function, task
+                        call = _call, source_digest(), dumps((function, task))
                         flying[self._client.submit(*call, pure=False)] = task
                 if not flying:
                     return

@@ -14,6 +14,7 @@ import time
 import tracemalloc
 from contextlib import contextmanager
 from functools import partial
+from importlib import import_module
 from types import SimpleNamespace
 
 import numpy as np
@@ -281,9 +282,22 @@ def test_no_scheduler_at_the_address(tmp_path, monkeypatch, capsys):
 
 
 def test_worker_with_another_program_is_refused():
-    assert pool._call(pool.source_digest(), abs, -1) == 1
+    work = pool.dumps((abs, -1))
+    assert pool._call(pool.source_digest(), work) == 1
     with pytest.raises(WorkError, match='another version of the program'):
-        pool._call('another', abs, -1)
+        pool._call('another', work)
+
+
+def test_cluster_that_lacks_a_package_is_refused(tmp_path, monkeypatch):
+    """Its scheduler need not know the classes of what it hands on."""
+    (tmp_path / 'stranger.py').write_text('class Task:\n    pass\n')
+    with monkeypatch.context() as here:
+        here.syspath_prepend(tmp_path)
+        task = import_module('stranger').Task()
+    monkeypatch.setattr(pool, 'source_digest', lambda: 'with stranger')
+    with cluster(tmp_path) as (address, _), worker_pool(scheduler=address) as workers:
+        with pytest.raises(WorkError, match='another version of the program'):
+            workers.results(repr, {0: task}, lambda done: None)
 
 
 def test_worker_with_another_vehicle_file_is_refused(flown):
