@@ -29,6 +29,7 @@ from glider_base.settings import (
     number,
     validate,
 )
+from glider_base.slot import usable
 from glider_base.wiring import SENSORS
 from glider_control.law import LawSettings
 from glider_control.settings import LAWS, ControlLawSettings, ControlSettings, check_law, with_law
@@ -653,8 +654,10 @@ def _with_known_fields(scenario: Scenario) -> Scenario:
         with named_in(f'{name}.field.', ValueError):
             field = current.field.known()
             resolved = scenario.resolved_current(current).field
-            resolved.params()
-            if isinstance(resolved, GridFileSettings):
+            if not isinstance(resolved, GridFileSettings):
+                usable('params', resolved.params)
+            else:
+                resolved.params()
                 check_ways(scenario, resolved, name == 'current' and not is_charted)
                 starts[f'{name}.field.file'] = resolved.start_s
         currents[name] = current.model_copy(update={'field': field})

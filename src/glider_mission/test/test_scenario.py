@@ -19,6 +19,7 @@ from glider_mission.scenario import (
     scenario_names,
     scenario_path,
 )
+from glider_model.ocean.fields.jet import JetSettings
 from glider_model.onboard.gate import GateSettings
 from glider_model.vehicle.file import vehicle_path
 
@@ -541,3 +542,9 @@ def test_a_file_lies_beside_the_scenario_or_else_in_the_working_folder(tmp_path,
         assert load_scenario(name, changes).water.profile == [[0.0, 1020.0]]
     written('there', 1025.0)
     assert load_scenario(str(mine), changes).water.profile == [[0.0, 1025.0]]
+
+
+def test_a_field_of_somebody_that_makes_no_params_is_named(monkeypatch):
+    monkeypatch.setattr(JetSettings, 'params', lambda self: 1 / 0)
+    with pytest.raises(ConfigurationError, match='current.field.params: .*ZeroDivisionError: div'):
+        load_scenario('helix', {'current.field.kind': 'jet'})
