@@ -8,6 +8,7 @@ vehicle of a YAML file, directly and over nodes.
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections import defaultdict
@@ -269,3 +270,29 @@ def test_a_surface_that_nothing_steers_by_is_told_in_a_line(machine):
     assert told.returncode == 2
     (line,) = filter(str.strip, told.stderr.splitlines())
     assert 'the vehicle has a rudder, which nothing steers by (allowed: fin; ' in line
+
+
+@pytest.mark.parametrize(
+    ('half', 'line', 'other', 'words'),
+    [
+        ('plant', 'return t_x', 'none = t_x', ['rudder_loads (', 'returns nothing', '6: force x']),
+        ('plant', 'params.moment ', 'params.weight ', ['rudder_loads (', "attribute 'weight'"]),
+        (
+            'control',
+            '    delta = ',
+            '    if error > 9.0:\n        return None\n    delta = ',
+            ['steer_by_rudder (', 'returns nothing', '2: state after the tick, angle'],
+        ),
+    ],
+)
+def test_a_mistake_in_either_half_is_told_in_a_line(machine, half, line, other, words):
+    file = machine.site / 'my_rudder' / f'{half}.py'
+    text = file.read_text()
+    assert text.count(line) == 1
+    file.write_text(text.replace(line, other))
+    options = ['--engine', 'direct', '--no-report', '--out', machine.folder / 'mistake']
+    told = machine.start('run', 'current_8deg', '--set', f'vehicle={machine.vehicle}', *options)
+    file.write_text(text)
+    shutil.rmtree(machine.folder / 'mistake', ignore_errors=True)
+    assert told.returncode == 2 and 'Traceback' not in told.stderr
+    assert all(word in told.stderr.splitlines()[-1] for word in words), told.stderr

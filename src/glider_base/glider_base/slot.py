@@ -40,9 +40,10 @@ def slot(stub: Callable) -> Callable:
     A stub that is marked by `default` is the body for all types that have none; by `returns` it
     says what a body has to return. The slot has a
     decorator ``body(params_type)`` for a kernel with the same parameters. Called by
-    uncompiled code, it calls that kernel.
+    uncompiled code, it calls that kernel, which is checked the first time.
     """
     bodies: dict[type, Any] = {}
+    called: set[Callable] = set()
     position = list(inspect.signature(stub).parameters).index('params')
 
     def find(params_type: type) -> Callable:
@@ -57,7 +58,11 @@ def slot(stub: Callable) -> Callable:
 
     @functools.wraps(stub)
     def call(*values):
-        return find(type(values[position]))(*values)
+        found = find(type(values[position]))
+        if found not in called and hasattr(stub, 'returns') and is_jitted(found):
+            _check(found, tuple(map(typeof, values)), stub.returns)
+        called.add(found)
+        return found(*values)
 
     def body(params_type: type) -> Callable:
         def fill(function):
@@ -172,7 +177,9 @@ def _check(kernel: Any, kinds: tuple, what: tuple[str | type, ...]) -> None:
             if (i := next(odd, None)) is not None:
                 kind = str(returned[i]).replace('unicode_type', 'str')
                 why = f'returns {kind} as {names[i]}'
-            elif 'state' in names[0] and not kernel.typingctx.unify_types(kinds[0], returned[0]):
+            elif (
+                'state' in names[0] and kernel.typingctx.unify_types(kinds[0], returned[0]) is None
+            ):
                 why = f'returns {returned[0]} as {names[0]}, which was {kinds[0]}'
             else:
                 return

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel
 from glider_base.settings import Settings, number
-from glider_base.slot import default, slot
+from glider_base.signals import Adaptation
+from glider_base.slot import default, returns, slot
 from glider_model.vehicle.file import Vehicle
 
 
@@ -39,6 +40,7 @@ class NoSteering(NamedTuple):
 
 
 @slot
+@returns('state after the tick', 'angle of the surface (rad)')
 def steer(state, seen, params, dt):
     """One tick of steering by a surface, of ``dt`` s, by the type of `SurfaceLawSettings.params`.
 
@@ -57,6 +59,7 @@ def _bank_to_turn(state, seen, params, dt):
 
 @slot
 @default
+@returns(*Adaptation._fields)
 def surface_learnt(learnt, state, params):
     """What is published on the topic ``adaptation``, with what steering has learnt of its surface.
 

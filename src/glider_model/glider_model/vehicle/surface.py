@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel
 from glider_base.settings import Settings
-from glider_base.slot import slot
+from glider_base.slot import returns, slot
 from glider_model.vehicle.quantity import optional, required
 
 
@@ -34,6 +34,7 @@ class NoSurface(NamedTuple):
 
 
 @slot
+@returns(*(f'force {axis} (N)' for axis in 'xyz'), *(f'moment {axis} (N m)' for axis in 'xyz'))
 def surface_loads(loads, u, v, w, p, q, r, delta, params):
     """Loads on hull and steering surface, by the type of its params (`SurfaceSettings.params`).
 
