@@ -315,6 +315,19 @@ def test_a_law_that_fails_ends_its_node_in_lockstep_and_else_is_not_heard(
         assert [bool(outputs) for _, outputs in node.sent] == [True, False, False, True]
 
 
+def test_a_law_that_raises_at_rest_is_compiled_and_its_node_starts(monkeypatch):
+    """Zeros are what it is compiled with: a division by the speed, say, that no flight has."""
+
+    def tick(held, t_s, inputs, dt):
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(block_node, 'answer', tick)
+    node, told = _node_of(True), []
+    node.block.wired.inputs, node.block.orders, node.state = ('odom',), (told.append,), 'at rest'
+    BlockNode.compile_kernels(node)
+    assert told == ['at rest']
+
+
 @pytest.mark.parametrize(
     ('act', 'named'),
     [

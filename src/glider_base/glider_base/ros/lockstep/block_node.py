@@ -11,7 +11,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from glider_base.block import Block, Said, Telling, answer, optional_topics
-from glider_base.errors import EXIT_FAILED
+from glider_base.errors import EXIT_FAILED, ConfigurationError
 from glider_base.kernel import on_compiling
 from glider_base.kernels.holding import Held
 from glider_base.ros.lockstep import health
@@ -20,8 +20,9 @@ from glider_base.ros.lockstep.peers import FAREWELL_S
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.lockstep.step_node import StepNode
 from glider_base.ros.parameters import changed_parameters, declare_settings
-from glider_base.settings import ConfigurationError, Settings
+from glider_base.settings import Settings
 from glider_base.signals import TICK_NS, TICK_S, at_tick, not_finite, raised
+from glider_base.slot import NOT_COMPILED
 from glider_base.wiring import at_rest, not_fitted, present
 
 RCLError = rclpy_implementation.RCLError
@@ -145,7 +146,12 @@ class BlockNode(StepNode, LifecycleNodeMixin):
 
         with on_compiling(tell):
             state = self.state
-            answer(self.held.held, 0.0, inputs, TICK_S)
+            try:
+                answer(self.held.held, 0.0, inputs, TICK_S)
+            except (ConfigurationError, *NOT_COMPILED):
+                raise
+            except Exception:  # of a law of somebody's own: compiled it is, and a tick will tell
+                pass
             self.held.state = state
             for order in self.block.orders:
                 order(state)
