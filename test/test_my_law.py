@@ -83,6 +83,7 @@ BROKEN = {
         'dry': ('no_such_module:app', 'ModuleNotFoundError: No module named'),
         'five': ('broken:NUMBER', 'TypeError: it is no typer.Typer'),
         'score': ('broken:NUMBER', 'ValueError: its name is taken'),
+        'sweep': ('broken:NUMBER', 'ValueError: its name is taken'),
     },
     'glider.guidance_methods': {'los': ('broken:Law', 'ValueError: its name is taken')},
     'glider.navigation_methods': {'blind': ('broken:Blind', 'ValueError: it reads or tells gps')},

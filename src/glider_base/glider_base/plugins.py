@@ -114,8 +114,13 @@ def sections(found: dict[str, ClassT]) -> dict[str, tuple]:
 
 
 def offered(group: str) -> dict[str, EntryPoint]:
-    """What is registered in a group, by name, not loaded."""
-    return {point.name: point for point in entry_points(group=group)}
+    """What is registered in a group, by name, not loaded; of one name that of the stack."""
+    found = {}
+    points = entry_points(group=group)
+    for point in sorted(points, key=lambda one: (not one.module.startswith('glider_'), one.value)):
+        if found.setdefault(point.name, point).value != point.value:
+            _tell(point, 'ValueError: its name is taken')
+    return found
 
 
 def used(point: EntryPoint, use: Callable[[Any], Any]) -> Any:
