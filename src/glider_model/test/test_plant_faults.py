@@ -14,6 +14,7 @@ from glider_base.wiring import PLANT
 from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.faults.kinds import NoFaults, NoFaultState
+from glider_model.plant.faults.sensing import with_faults
 from glider_model.plant.faults.settings import ACTUATORS
 from glider_model.plant.plant import PlantSettings
 from glider_model.plant.sensors import HAS_FIX, NO_FIX
@@ -285,6 +286,16 @@ def test_fixes_can_be_off_and_absent():
     moved = 111195.0 * (off.topic('fix')[-1, 1:3] - clean[-1, 1:3])
     moved[1] *= math.cos(math.radians(clean[-1, 1]))
     assert moved == pytest.approx([1000.0, 1000.0], rel=1e-3)
+
+
+def test_a_sensor_of_which_no_fault_knows_is_handed_on():
+    flown = Flown([fault('biased', sensor='heading', error=5.0)], 1.0)
+    *_, state = flown.states
+    *_, numbers = flown.told
+    further = (state, flown.params.sensors, flown.params.faults)
+    told = with_faults((*numbers[:6], (7.0,), *numbers[6:]), *further)
+    assert told[6] == (7.0,)
+    assert (*told[:6], *told[7:]) == with_faults(numbers, *further) != numbers
 
 
 def test_health_sensors_tell_of_battery_vacuum_and_contact():

@@ -52,7 +52,8 @@ def _with_faults(numbers, state, sensors, params):
     if not any_begun(faults):
         return numbers
     total = summed(faults, state.tick, params)
-    truth, position, imu, pressure, fix, altitude, health, battery, joints = numbers
+    truth, position, imu, pressure, fix = numbers[:5]
+    health, battery, joints = numbers[-3:]
     if total[kinds.NO_FIXES] > 0.0:
         fix = (NO_FIX, 0.0, 0.0, 0.0, 0.0)
     right = _seen((truth, position, imu, pressure, fix), sensors)
@@ -67,7 +68,7 @@ def _with_faults(numbers, state, sensors, params):
             variance = sensors.gps.std * sensors.gps.std
             fix = (seen[FIX + 2], seen[FIX], seen[FIX + 1], variance, variance)
     health, battery = _health(health, total), _battery(battery, total)
-    return truth, position, imu, pressure, fix, altitude, health, battery, joints
+    return (truth, position, imu, pressure, fix) + numbers[5:-3] + (health, battery, joints)
 
 
 @kernel
