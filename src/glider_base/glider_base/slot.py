@@ -148,7 +148,7 @@ def _is_usable(kind: Any, what: str | type) -> bool:
     """Whether compiled code can take what is returned for what: numbers, and tuples of them."""
     if isinstance(what, type):
         return getattr(kind, 'instance_class', None) is what and _is_numbers(kind)
-    return isinstance(kind, _REAL | types.BaseTuple | types.Array)
+    return isinstance(kind, _REAL | types.BaseTuple | types.Array if 'state' in what else _REAL)
 
 
 def _is_numbers(kind: Any) -> bool:

@@ -621,6 +621,14 @@ def moments_by_an_import(seen):
     return tanh(seen.m_b), 0.0
 
 
+def moments_of_a_vector(seen):
+    return np.zeros(2), 0.0
+
+
+def moment_of_a_doubt(seen):
+    return seen.roll_held, 1
+
+
 def moment_on_two_axes(seen):
     return 0.0, 1.0j
 
@@ -758,6 +766,7 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
             ['control.law: params: <ipython-input-1>, line ', ': SystemExit: no licence'],
         ),
         (moment_on_two_axes, {}, ['moment_on_two_axes (', 'complex128 as pitch moment']),
+        (moments_of_a_vector, {}, ['moments_of_a_vector (', 'array(', 'as roll moment']),
         (run_cell(CELL.replace('def initial', 'def first')), {}, ['LevelLaw', 'no initial_state']),
         (run_cell(CELL.partition('@law')[0]), {}, ['law_step: no body for params of type Level']),
         (run_cell(CELL + LEARNT), {}, ['learnt (<ipython-input-1>', 'returns 2', 'roll_bias_nm']),
@@ -768,6 +777,11 @@ def test_law_that_cannot_be_flown_is_told(law, choices, words):
         glider.fly('current_8deg', law=law, **choices)
     assert all(word in str(error.value) for word in words)
     assert len(str(error.value).splitlines()) == 1
+
+
+def test_a_truth_value_is_a_moment_of_0_or_1():
+    run = glider.fly('current_8deg', {'profile.prepare_s': 0.0}, law=moment_of_a_doubt, duration=1)
+    assert run.score['status'] == 'completed'
 
 
 @pytest.mark.parametrize(

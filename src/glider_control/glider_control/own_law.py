@@ -64,7 +64,7 @@ def _stateless(function: Callable) -> type[LawSettings]:
     @numba.njit(error_model='numpy', forceinline=True)
     def step(state, seen, params, dt):
         tau_p, tau_q = moments(seen)
-        return state, float(tau_p), float(tau_q)
+        return state, 1.0 * tau_p, 1.0 * tau_q  # of a truth value, too
 
     Stateless.__name__ = function.__name__
     Stateless.__doc__ = function.__doc__ or f'The function {function.__name__}.'
