@@ -72,7 +72,7 @@ def make_scene(name: str) -> Scene:
     scenario = load_scenario('current_12deg', {'dives': 0, **SCENES[name]})
     state, params = mission_of(scenario)
     log = np.empty((TICKS, ROW))
-    state, _, _ = fly(state, params, log, TICK_S)
+    state, _, _ = fly(state, params, log)
     wires = {name: tuple(float(x) for x in log[-1, COLUMNS[name]]) for name in READ}
     return Scene(state, params, wires)
 

@@ -5,7 +5,6 @@
 import numpy as np
 import pytest
 
-from glider_base.signals import TICK_S
 from glider_bringup.engines.direct import fly
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.scoring.card import fly_scored
@@ -61,7 +60,7 @@ def test_guidance_looks_further_ahead_for_the_weak_only(seed, is_weak):
     state, params = mission_of(scenario)
     log, is_over = np.empty((50000, ROW)), False
     while not is_over:
-        state, _, is_over = fly(state, params, log, TICK_S)
+        state, _, is_over = fly(state, params, log)
     steering, turning = state.guidance.followed.steering, params.guidance.steering
     dive_s, climb_s = (lookahead(steering, down, turning) for down in (True, False))
     assert climb_s < 150.0

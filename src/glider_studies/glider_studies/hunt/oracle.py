@@ -100,7 +100,7 @@ def _flown(scenario: Scenario, for_s: float) -> tuple[MissionState, MissionParam
     """State, params and log (float64[ticks, ROW]) of a flight of ``for_s`` or less."""
     state, params = mission_of(scenario)
     log = np.empty((round(for_s / TICK_S), ROW))
-    state, rows, _ = direct.fly(state, params, log, TICK_S)
+    state, rows, _ = direct.fly(state, params, log)
     return state, params, log[:rows]
 
 
