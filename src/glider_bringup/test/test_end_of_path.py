@@ -138,6 +138,20 @@ def test_it_arrives_though_it_is_carried_back_in_each_stay_at_the_surface():
     assert arrival['arrived'] and arrival['missed_m'] < 50.0
 
 
+def test_who_comes_up_near_its_last_point_and_no_nearer_than_before_has_arrived():
+    """Its last dives are shallow, where the current is strong: it dived there for ever."""
+    path = {'kind': 'straight', 'course_deg': 0.0, 'length_m': 6000.0, 'at_end': 'stop'}
+    flow = {'kind': 'shear', 'law': 'exponential', 'depth_m': 30.0, 'direction_deg': 180.0}
+    changes = {'vehicle': 'seaglider', 'dives': 0, 'path': path, 'duration_s': 70000.0}
+    changes |= {'profile.depth_m': 200.0, 'profile.pitch_deg': 20.0, 'profile.wait_s': 600.0}
+    changes |= {'profile.net_heaviness_kg': 0.2, 'profile.surface_every_dives': 1}
+    changes |= {'current': {'components': [{**flow, 'speed_mps': 0.45}]}}
+    arrival = glider.fly('current_8deg', changes).score['arrival']
+    assert arrival['arrived'] and arrival['t_s'] < 60000.0 and arrival['missed_m'] < 500.0
+    near = glider.fly('current_8deg', {**changes, 'path.arrival_radius_m': 100.0}).score
+    assert not near['arrival']['arrived']
+
+
 @pytest.mark.parametrize(
     ('begins_m', 'depth_m'), [(8.0, 20.0), (40.0, 50.0), (199.0, 200.0), (300.0, 200.0)]
 )

@@ -97,6 +97,7 @@ class GuidanceParams(NamedTuple):
     method: NamedTuple  #: of the method that was chosen
     end_s: float  #: when the mission ends (s)
     ends_with_path: bool  #: comes up at the end of the path, and stays there
+    arrival_radius: float  #: of the last point (m)
     no_progress_surfacings: int  #: so many without progress are reported; 0: none are
     target_gain: float  #: delta1 (1/s)
     observer: ObserverParams
@@ -299,11 +300,21 @@ def locate(s, odometry, params):
 
 @kernel
 def _way_left(state, e1, params):
-    """What is left of the path; infinite for a mission that does not end with it."""
+    """What is left of the path; infinite for a mission that does not end with it.
+
+    Nothing for who has come up near enough to its end, and no nearer to it than before.
+    """
     if not params.ends_with_path:
         return WayLeft(math.inf, 0.0)
-    if state.s >= path_length(params.path):
+    length = path_length(params.path)
+    if state.s >= length:
         return WayLeft(0.0, 0.0)
+    stage, near = state.profile.stage, params.arrival_radius
+    is_up = stage == WAITING_ON_SURFACE or stage == SURFACE_PREPARATION
+    if is_up and state.progress.surfacings > 0 and length - state.s <= near:
+        place, (north, east, _) = state.gate.odometry, path_point(length, params.path)
+        if math.hypot(place.p_n - north, place.p_e - east) <= near:
+            return WayLeft(0.0, 0.0)
     observer = state.water.observer
     return way_left(
         state.s,

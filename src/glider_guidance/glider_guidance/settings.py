@@ -248,6 +248,7 @@ class GuidanceSettings(GuidanceLawSettings):
             method=usable('guidance.los.method: params', self.chosen.params, self.los, vehicle),
             end_s=self.duration_s if self.duration_s > 0.0 else math.inf,
             ends_with_path=self.path.at_end == 'stop',
+            arrival_radius=self.path.arrival_radius_m,
             no_progress_surfacings=self.no_progress_surfacings,
             target_gain=self.los.delta1_per_s,
             observer=ObserverParams(self.observer.k3_per_s, self.observer.k4_per_s2),
