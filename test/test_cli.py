@@ -208,6 +208,7 @@ MISTAKES = [
     (['autopilot', 'helix', '--ros-args', '-r', '__ns:=/a'], ['__ns:=/a', '--namespace']),
     (['autopilot', 'helix', '--ros-args', '-r', '__node:=a'], ['__node:=a', 'by their names']),
     (['autopilot', 'helix', '--ros-args', '-r', '__name:=a'], ['__name:=a', 'by their names']),
+    (['autopilot', 'helix', '--ros-args', '-p', 'gaurd_node:lost_after_s:=9.0'], ['guard_node']),
 ]
 
 

@@ -24,6 +24,7 @@ from glider_bringup.cli import app
 from glider_bringup.engines.recorded import fly_recorded
 from glider_bringup.scoring.again import score_again
 from glider_mission.recording.mcap_reader import Bag
+from glider_mission.recording.mcap_writer import McapWriter
 from glider_mission.recording.recover import recover
 from glider_mission.recording.ros.rosbag2 import CHUNK_TICKS
 from glider_mission.run_folder import make_run_folder
@@ -211,6 +212,19 @@ def test_cut_bag_of_another_writer(short_run, read_bag, write_bag, tmp_path, chu
     assert read_bag(file) == messages[: found['messages']]
     with AnyReader([tmp_path / 'theirs']) as reader:
         assert reader.message_count == found['messages']
+
+
+def test_a_recording_that_is_still_being_written_is_left_alone(tmp_path):
+    """It took the place of the file, and all that its recorder still wrote was lost."""
+    file = tmp_path / 'run_0.mcap'
+    writer = McapWriter(file, 'ros2')
+    writer.flush()
+    before = file.read_bytes()
+    with pytest.raises(ConfigurationError, match='run_0.mcap: is still being written'):
+        recover(tmp_path)
+    assert file.read_bytes() == before
+    writer.close()
+    assert recover(tmp_path)['rebuilt'] == ['metadata.yaml']
 
 
 @pytest.mark.parametrize('length', [0, 5, 8, 12])

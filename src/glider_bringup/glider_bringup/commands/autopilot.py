@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``./glider autopilot``: what goes on board a vehicle."""
 
+import re
 import tempfile
 from pathlib import Path
 from typing import Annotated
@@ -68,6 +69,11 @@ def autopilot(
     flown = load_scenario(scenario, chosen_fields(changed_fields(changes), controller))
     reckons = 'measured_odom' not in flown.navigation.topics if navigation is None else navigation
     parts = [name for name in PARTS if name != 'navigation' or reckons]
+    nodes = [f'{name}_node' for name in parts]
+    for word in called.args:  # rcl passes over what is of a node that there is not
+        whose = re.match(r'([\w/]+):(?!=|//).*:=', word)
+        if whose and whose[1].rpartition('/')[2] not in nodes:
+            raise ConfigurationError(f'{word}: no such node (allowed: {", ".join(nodes)})')
     parameters = node_parameters(flown, lockstep=False, navigates=reckons)
     with tempfile.TemporaryDirectory() as scratch:
         file = Path(scratch) / 'parameters.yaml'

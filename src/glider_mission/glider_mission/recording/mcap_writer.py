@@ -8,11 +8,13 @@ mission of 30 h has ten million messages. The bytes depend on what is written an
 Chunks, attachments, the data section and the summary all carry checksums.
 """
 
+import fcntl
 import os
 import struct
 import zlib
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -34,12 +36,15 @@ class McapWriter:
 
     After `flush` the operating system has every message: they outlive this process. After `sync`
     the disk has them: they outlive the machine. The file is complete after `close`. All three
-    raise a `DiskError` if the disk takes no more; what was flushed before can be read.
+    raise a `DiskError` if the disk takes no more; what was flushed before can be read. Until then
+    the file is locked (flock), where the file system has locks.
     """
 
     def __init__(self, path: Path, profile: str) -> None:
         self._path = path
         self._file = path.open('wb', buffering=0)
+        with suppress(OSError):  # where a file system has no locks
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         self._pending = bytearray(MAGIC)  #: of the file, not yet handed to the operating system
         self._handed, self._checksum = 0, 0  #: length of what was, and its CRC
         self._compressor = zstandard.ZstdCompressor(level=3)

@@ -7,6 +7,7 @@ the plug meanwhile finds the one or the other. Its chunks are those of the old f
 ours is then, byte by byte, what its recorder would have left had it been stopped there.
 """
 
+import fcntl
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -110,6 +111,7 @@ def _rebuild(file: Path, progress: Progress) -> list[tuple[int, str]]:
     dropped = []
     try:
         with file.open('rb') as stream:
+            _refuse_if_written(stream, file)
             if stream.read(len(records.MAGIC)) != records.MAGIC:
                 raise ConfigurationError(f'{file}: not an MCAP file, or nothing is left of it')
             for opcode, at, data in records.whole_records(stream):
@@ -137,6 +139,18 @@ def _rebuild(file: Path, progress: Progress) -> list[tuple[int, str]]:
     finally:
         draft.unlink(missing_ok=True)
     return [(size, f'{file.name}: {what}') for size, what in dropped]
+
+
+def _refuse_if_written(stream: IO[bytes], file: Path) -> None:
+    """Refuse a file whose writer is still at work: its end is not missing, but to come."""
+    try:
+        fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise ConfigurationError(
+            f'{file}: is still being written (allowed: once its recorder has ended)'
+        ) from None
+    except OSError:  # the file system has no locks
+        pass
 
 
 def _take(writer: McapWriter, opcode: int, data: bytes) -> tuple[str, str] | None:
