@@ -112,7 +112,7 @@ def changes_text(changes: dict[str, Any]) -> str:
     return ' with ' + ', '.join(fields[:CHANGES_SHOWN] + more) if fields else ''
 
 
-def raised(error: BaseException, calls: int = 1) -> str:
+def said_by(error: BaseException, calls: int = 1) -> str:
     """What code that may not be ours has raised, and where, so many calls from here, in words."""
     frames = extract_tb(error.__traceback__)[calls : calls + 1]
     where = ''.join(f'{at.filename}, line {at.lineno}: ' for at in frames)

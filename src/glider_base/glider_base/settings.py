@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar, get_args, get_origin
 
 import pydantic
 
-from glider_base.errors import MAX_LINES, ConfigurationError, clipped, raised, shown
+from glider_base.errors import MAX_LINES, ConfigurationError, clipped, said_by, shown
 
 SettingsT = TypeVar('SettingsT', bound='Settings')
 ParamsT = TypeVar('ParamsT', bound=NamedTuple)
@@ -303,7 +303,7 @@ def made(
     except pydantic.ValidationError:
         raise
     except (Exception, SystemExit) as error:
-        raise ConfigurationError(f'{source}: {raised(error, calls=2)}') from error
+        raise ConfigurationError(f'{source}: {said_by(error, calls=2)}') from error
 
 
 def validate(

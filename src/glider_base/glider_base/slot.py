@@ -25,7 +25,7 @@ from numba.core import types
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.extending import is_jitted, overload
 
-from glider_base.errors import ConfigurationError, raised, shown
+from glider_base.errors import ConfigurationError, said_by, shown
 from glider_base.kernel import INLINED, kernel
 from glider_base.kernels.cache import BODIES, Body
 
@@ -119,7 +119,7 @@ def usable(what: str, make: Callable, *of: Any) -> Any:
     except ConfigurationError:
         raise
     except (Exception, SystemExit) as error:  # it may not be our code
-        raise ConfigurationError(f'{what}: {raised(error)}') from error
+        raise ConfigurationError(f'{what}: {said_by(error)}') from error
     try:
         typeof(values)
     except ValueError:

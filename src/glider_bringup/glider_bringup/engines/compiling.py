@@ -6,12 +6,15 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 
+import numpy as np
+
 from glider_base.errors import MAX_LINE, ConfigurationError
 from glider_base.kernel import on_compiling
 from glider_base.slot import NOT_COMPILED, reason
 from glider_bringup.engines.direct import HeldMission
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.interrupts import interrupts_noted
+from glider_mission.blocks import ROW
 from glider_mission.choices import Combination
 from glider_mission.scenario import load_scenario
 from glider_model.vehicle.file import load_vehicle, vehicle_path
@@ -47,6 +50,7 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
 
     Raises KeyboardInterrupt after the loop that was being compiled.
     """
+    nothing = np.empty((0, ROW))
     with interrupts_noted() as interrupts:
         for one in dict.fromkeys(combinations):
             changes = {
@@ -65,6 +69,6 @@ def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
             except ConfigurationError:
                 continue  # by a law that may take the vehicle of its flights: these will tell
             with shown_once(one, tell):
-                HeldMission(state, params)
+                HeldMission(state, params).fly(nothing)
             if interrupts:
                 raise KeyboardInterrupt(interrupts[0])
