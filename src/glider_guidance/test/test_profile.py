@@ -384,7 +384,8 @@ def test_a_bottom_that_is_near_for_three_seconds_turns_a_dive():
     for _ in range(NEAR_TICKS):
         state = profile_step(state, 100.0, 0.2, 5.0, NO_END, params)
         assert state.stage == GLIDING_DOWN
-    assert profile_step(state, 100.0, 0.2, NO_ECHO, NO_END, params).near_ticks == 0
+    for no_echo in (NO_ECHO, -1.0):  # some drivers say that
+        assert profile_step(state, 100.0, 0.2, no_echo, NO_END, params).near_ticks == 0
     assert profile_step(state, 100.0, 0.2, 5.0, NO_END, params).stage == INFLECTING_UP
 
 

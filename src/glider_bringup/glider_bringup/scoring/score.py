@@ -457,12 +457,28 @@ def windows(
 
 def _heading_fluctuation_deg(heading: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Heading less its running mean over HEADING_MEAN_S (deg), and where that mean is whole."""
-    unwrapped = np.unwrap(heading) - (heading[0] if len(heading) else 0.0)
-    half, index = round(0.5 * HEADING_MEAN_S / TICK_S), np.arange(len(heading))
-    total = np.concatenate(([0.0], np.cumsum(unwrapped)))
-    first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, len(heading))
-    mean = (total[last] - total[first]) / (last - first)
-    return np.degrees(unwrapped - mean), last - first == 2 * half + 1
+    half = round(0.5 * HEADING_MEAN_S / TICK_S)
+    whole = np.zeros(len(heading), np.bool_)
+    whole[half : len(heading) - half] = True
+    return np.degrees(_less_its_mean(heading, half)), whole
+
+
+@kernel
+def _less_its_mean(heading, half):
+    """Heading (rad) less its mean over ``half`` ticks before and after, the way round it went."""
+    ticks, turned = len(heading), 0.0
+    unwrapped, total = np.empty(ticks), np.zeros(ticks + 1)
+    for k in range(ticks):
+        step = heading[k] - heading[max(0, k - 1)]
+        if abs(step) > math.pi:
+            turned += (step + math.pi) % (2.0 * math.pi) - math.pi - step
+        unwrapped[k] = heading[k] + turned - heading[0]
+        total[k + 1] = total[k] + unwrapped[k]
+    less = np.empty(ticks)
+    for k in range(ticks):
+        first, last = max(k - half, 0), min(k + half + 1, ticks)
+        less[k] = unwrapped[k] - (total[last] - total[first]) / (last - first)
+    return less
 
 
 @kernel

@@ -242,7 +242,7 @@ def _next_stage(state, depth, vertical_rate, turn_depth, params):
 @kernel
 def _near_ticks(state, vertical_rate, altitude, params):
     """Ticks for which a dive has been so near to the bottom that it is to turn."""
-    if params.clearance == 0.0 or altitude == NO_ECHO or not is_descending(state.stage):
+    if params.clearance == 0.0 or altitude <= NO_ECHO or not is_descending(state.stage):
         return 0
     # what was learnt may be of a turn with little weight
     lead_s = max(params.lead_s, turn_lead_s(state, params)) + NEAR_TICKS * TICK_S
