@@ -19,7 +19,7 @@ import pydantic
 from glider_base.kernel import kernel
 from glider_base.settings import number, positive
 from glider_base.signals import TICK_S, Vector
-from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
+from glider_model.ocean.current import CurrentParams, current_in_place
 from glider_model.ocean.current_settings import SumOfCurrents
 from glider_model.ocean.field import Mission
 
@@ -69,7 +69,7 @@ class Forecast(NamedTuple):
 
     is_used: bool
     params: CurrentParams
-    nothing: CurrentState  #: no part of it remembers anything
+    nothing: np.ndarray  #: values that its parts remember: none
     late_s: float = 0.0  #: age (s)
 
 
@@ -83,7 +83,7 @@ class Trust(NamedTuple):
 def make_forecast(settings: ForecastSettings, is_used: bool) -> Forecast:
     """Forecast of some settings, or of none."""
     params = (settings if is_used else ForecastSettings()).params()
-    return Forecast(is_used, params, CurrentState(0, np.zeros(0)), 3600.0 * settings.late_h)
+    return Forecast(is_used, params, np.zeros(0), 3600.0 * settings.late_h)
 
 
 @kernel
@@ -97,9 +97,7 @@ def forecast_at(forecast, place, depth, deepest, t_s):
     for k in range(levels if forecast.is_used else 0):
         at = depth if levels == 1 else (k + 0.5) / levels * deepest
         position, then_s = (place.n, place.e, at), t_s - forecast.late_s
-        _, water = current_step_in_place(
-            forecast.nothing, position, then_s, forecast.params, TICK_S
-        )
+        water = current_in_place(0, forecast.nothing, position, then_s, forecast.params, TICK_S)
         v_n += water.v_n / levels
         v_e += water.v_e / levels
     return Vector(v_n, v_e)

@@ -27,7 +27,7 @@ from glider_guard.guard import GuardParams, GuardState
 from glider_guidance.block import guidance_tick
 from glider_guidance.guidance import GuidanceParams, GuidanceState
 from glider_mission.blocks import BLOCK_TICKS, COLUMNS, ROW
-from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
+from glider_model.ocean.current import CurrentParams, CurrentState, current_in_place
 from glider_model.plant.block import Measured, plant_move, plant_outputs
 from glider_model.plant.plant import PlantParams, PlantState, not_finite, state_fault
 from glider_navigation.block import navigation_tick
@@ -87,7 +87,7 @@ def fly_held(held, log, dt):
     in_guidance, guidance = held.guidance.params, held.guidance.state
     in_control, control = held.control.params, held.control.state
     in_guard, guard = held.guard.params, held.guard.state
-    current = CurrentState(current.tick, current.values.copy())  # changed where they lie
+    flown, values = current.tick, current.values.copy()  # changed where they lie
     rows, finished = 0, False
     for row in range(log.shape[0]):
         t_s = plant.tick * dt
@@ -97,7 +97,7 @@ def fly_held(held, log, dt):
         sensors = (measured.measured_odom, measured.imu, pressure, measured.fix, measured.altitude)
         place = odometry_from_wire(measured.ground_truth_odom)
         position = (place.p_n, place.p_e, place.p_d)
-        current, velocity = current_step_in_place(current, position, t_s, in_current, dt)
+        velocity = current_in_place(flown + row, values, position, t_s, in_current, dt)
         water = water_to_wire(velocity)
         navigation, estimated, phase = navigation_tick(
             navigation, t_s, (joints, *sensors), in_navigation, dt
@@ -117,7 +117,8 @@ def fly_held(held, log, dt):
         rows = row + 1
         if finished:
             break
-    held.plant.state, held.current.state, held.navigation.state = plant, current, navigation
+    held.current.state = CurrentState(flown + rows, values)
+    held.plant.state, held.navigation.state = plant, navigation
     held.guidance.state, held.control.state, held.guard.state = guidance, control, guard
     return rows, finished
 

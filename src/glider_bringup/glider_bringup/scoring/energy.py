@@ -27,12 +27,13 @@ def _joints_of(row):
 @kernel
 def _spend_rows(ledger, surfacing, last, log, params):
     """Ledger and surfacing after the rows of a log, whose ``last`` row before them is given."""
+    depth, now = -last[_DOWN], _joints_of(last)
     for k in range(len(log)):
-        depths = (-last[_DOWN], -log[k, _DOWN])
+        depths = (depth, -log[k, _DOWN])
         before, surfacing = surfacing, surface_after(surfacing, depths[1])
-        was, now, surfacings = _joints_of(last), _joints_of(log[k]), (before, surfacing)
+        was, now, surfacings = now, _joints_of(log[k]), (before, surfacing)
         ledger = spend(ledger, was, now, depths, surfacings, params, TICK_S)
-        last = log[k]
+        depth = depths[1]
     return ledger, surfacing
 
 

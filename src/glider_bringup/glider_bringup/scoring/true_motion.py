@@ -6,11 +6,13 @@ import math
 
 import numpy as np
 
+from glider_base.kernel import kernel
 from glider_mission.blocks import COLUMNS
 
 _TRUTH_START, _ODOM_START = (COLUMNS[name].start for name in ('ground_truth/odom', 'odom'))
-#: Numbers of an odometry, without its covariance.
-_TRUTH, _ODOM = (slice(start, start + 13) for start in (_TRUTH_START, _ODOM_START))
+#: Of an odometry without its covariance.
+_NUMBERS = 13
+_TRUTH, _ODOM = (slice(start, start + _NUMBERS) for start in (_TRUTH_START, _ODOM_START))
 _E1, _E2 = COLUMNS['tracking_error'].start, COLUMNS['tracking_error'].start + 1
 #: Of the virtual target.
 _EAST, _NORTH = COLUMNS['reference'].start, COLUMNS['reference'].start + 1
@@ -23,8 +25,28 @@ _AWAY_M = 1.0
 
 def jumps(target: np.ndarray, before: np.ndarray) -> np.ndarray:
     """Rows in which the virtual target, float64[n, 2], is on another path than a row earlier."""
-    moved_m = np.hypot(*np.diff(target, axis=0, prepend=before[np.newaxis]).T)
-    return np.flatnonzero(moved_m > JUMP_M)
+    return np.flatnonzero(_jumped(target, before))
+
+
+@kernel
+def _jumped(target, before):
+    jumped = np.empty(len(target), np.bool_)
+    east, north = before
+    for row in range(len(target)):
+        last_east, last_north = east, north
+        east, north = target[row, 0], target[row, 1]
+        jumped[row] = math.hypot(east - last_east, north - last_north) > JUMP_M
+    return jumped
+
+
+@kernel
+def _tells_the_truth(log):
+    """Whether the odometry of log rows is the true motion."""
+    for row in range(len(log)):
+        for i in range(_NUMBERS):
+            if log[row, _ODOM_START + i] != log[row, _TRUTH_START + i]:
+                return False
+    return True
 
 
 def course_at(row: np.ndarray) -> float | None:
@@ -54,7 +76,7 @@ class TrueMotion:
         """
         if not len(log) or np.isnan(log[0, _TRUTH_START]):
             return log
-        if np.array_equal(log[:, _ODOM], log[:, _TRUTH]):
+        if _tells_the_truth(log):
             return log
         if len(log) > len(self._rows):
             self._rows = np.empty_like(log)

@@ -15,7 +15,7 @@ from glider_base.signals import TICK_S
 from glider_mission.routing.fronts import Chart, current_on
 from glider_mission.scenario import Scenario, check_starts, named_in
 from glider_model.ocean.bottom import bottom_depth
-from glider_model.ocean.current import CurrentParams, CurrentState, current_step_in_place
+from glider_model.ocean.current import CurrentParams, current_in_place
 from glider_model.ocean.current_settings import CurrentSettings
 from glider_model.ocean.fields.grid import GridSettings
 
@@ -36,7 +36,7 @@ def _depth_means(params, nothing, times, norths, easts, depths, found):
                 v_n, v_e = 0.0, 0.0
                 for depth in depths:
                     place = (norths[i], easts[j], depth)
-                    _, water = current_step_in_place(nothing, place, times[t], params, TICK_S)
+                    water = current_in_place(0, nothing, place, times[t], params, TICK_S)
                     v_n += water.v_n
                     v_e += water.v_e
                 found[t, i, j, 0] = v_n / len(depths)
@@ -98,7 +98,7 @@ def forecast_of(scenario: Scenario, stay: float) -> Forecast:
     times = np.arange(0.0, scenario.duration_s + STEP_S, STEP_S)
     depths = (np.arange(_LEVELS) + 0.5) * scenario.profile.depth_m / _LEVELS
     means, at_top = np.empty((2, len(times), len(norths), len(easts), 2), dtype=np.float32)
-    nothing = CurrentState(0, np.zeros(0))
+    nothing = np.zeros(0)
     for levels, found in ((depths, means), (np.zeros(1), at_top)):
         _depth_means(params, nothing, times - late_s, norths, easts, levels, found)
     stays = stay * (at_top + np.float32(scenario.water.wind_drift()) - means)

@@ -90,51 +90,51 @@ def current_step(
     The position p_NB is 3 numbers (m, NED), and above the surface counts as the surface; ``t_s``
     is the time since the start (s), of which is the state.
     """
-    fresh = CurrentState(state.tick, state.values.copy())
-    return current_step_in_place(fresh, position, t_s, params, dt)
+    values = state.values.copy()
+    water = current_in_place(state.tick, values, position, t_s, params, dt)
+    return CurrentState(state.tick + 1, values), water
 
 
 @kernel
-def current_step_in_place(state, position, t_s, params, dt):
-    """`current_step` for a loop that owns its state: the values are changed where they lie.
+def current_in_place(tick, values, position, t_s, params, dt):
+    """Water velocity of `current_step` for a loop that owns its state, and counts the ticks.
 
-    A loop over it allocates nothing and counts no references, which takes longer than the rest.
+    The values are changed where they lie: it allocates nothing.
     """
     depth = max(position[2], 0.0)
-    values = state.values
+    numbers = params.numbers
     v_n, v_e, v_d = 0.0, 0.0, 0.0
     for i in range(len(params.kind)):
         kind = params.kind[i]
-        numbers = params.numbers[i]
         first, last = params.first[i], params.last[i]
         if kind == CONSTANT:
-            v_n += numbers[0]
-            v_e += numbers[1]
+            v_n += numbers[i, 0]
+            v_e += numbers[i, 1]
         elif kind == POWER_SHEAR:
-            share = max(1.0 - depth / numbers[2], 0.0) ** numbers[3]
-            v_n += share * numbers[0]
-            v_e += share * numbers[1]
+            share = max(1.0 - depth / numbers[i, 2], 0.0) ** numbers[i, 3]
+            v_n += share * numbers[i, 0]
+            v_e += share * numbers[i, 1]
         elif kind == EXPONENTIAL_SHEAR:
-            share = math.exp(-depth / numbers[2])
-            v_n += share * numbers[0]
-            v_e += share * numbers[1]
+            share = math.exp(-depth / numbers[i, 2])
+            v_n += share * numbers[i, 0]
+            v_e += share * numbers[i, 1]
         elif kind == TABLE:
             north, east, down = _profile(depth, params.table, first, last)
             v_n += north
             v_e += east
             v_d += down
         elif kind == TIDAL:
-            angle = numbers[4] * t_s + numbers[5]
+            angle = numbers[i, 4] * t_s + numbers[i, 5]
             along, across = math.cos(angle), math.sin(angle)
-            v_n += along * numbers[0] + across * numbers[2]
-            v_e += along * numbers[1] + across * numbers[3]
+            v_n += along * numbers[i, 0] + across * numbers[i, 2]
+            v_e += along * numbers[i, 1] + across * numbers[i, 3]
         elif kind == GAUSS_MARKOV:
             v_n += values[first]
             v_e += values[first + 1]
             # exact for any dt, so that the statistics do not depend on it
-            keep = math.exp(-dt / numbers[1])
-            fresh = numbers[0] * math.sqrt(1.0 - keep * keep)
-            north, east = normal_pair(params.stream[i], state.tick + 1)
+            keep = math.exp(-dt / numbers[i, 1])
+            fresh = numbers[i, 0] * math.sqrt(1.0 - keep * keep)
+            north, east = normal_pair(params.stream[i], tick + 1)
             values[first] = keep * values[first] + fresh * north
             values[first + 1] = keep * values[first + 1] + fresh * east
         elif kind == STEPS:
@@ -142,4 +142,4 @@ def current_step_in_place(state, position, t_s, params, dt):
             v_n += north
             v_e += east
     north, east, down = field_velocity((position[0], position[1], depth), t_s, params.field)
-    return CurrentState(state.tick + 1, values), Water(v_n + north, v_e + east, v_d + down)
+    return Water(v_n + north, v_e + east, v_d + down)
