@@ -17,12 +17,10 @@ REACTIONS = ('none', 'note', 'hold', 'surface', 'drop')
 
 
 class Row(NamedTuple):
-    """One thing that is watched for."""
+    """One thing that is watched for; docs/safety.md tells when it holds, and by what fields."""
 
     bit: int
     name: str
-    trigger: str  #: in words
-    parameter: str  #: settings and fields of the vehicle that say when; empty: none do
     says: str  #: on /diagnostics
     reaction: int = SURFACE
 
@@ -44,14 +42,8 @@ ASTRAY, CONTRADICTED = 1 << 27, 1 << 30
 
 def _stuck(bit: int, part: str, reaction: int) -> Row:
     """Row of an actuator that does not follow its command."""
-    return Row(
-        bit,
-        f'{part.replace(" ", "_")}_stuck',
-        f'the {part} is off its command and does not go there',
-        'follow_share, stall_s',
-        f'the {part} does not follow its command',
-        reaction,
-    )
+    says = f'the {part} does not follow its command'
+    return Row(bit, f'{part.replace(" ", "_")}_stuck', says, reaction)
 
 
 #: Every row, in the order in which they are reported.
@@ -60,168 +52,41 @@ ROWS = (
     _stuck(STUCK_PITCH, 'pitch mass', SURFACE),
     _stuck(STUCK_ROLL, 'roll mass', HOLD),
     _stuck(STUCK_SURFACE, 'steering surface', HOLD),
-    Row(
-        ORDERED,
-        'surface_ordered',
-        'guidance asks for the surface: its service abort, or an input that was lost',
-        'lost_after_s',
-        'ordered to the surface',
-    ),
-    Row(
-        TOO_DEEP,
-        'too_deep',
-        'deeper than rated_depth and still sent down, or sinking on to deeper by a margin',
-        'rated_depth, depth_margin_share, depth_margin_m',
-        'deeper than the vehicle is rated for',
-    ),
-    Row(
-        CRUSHING,
-        'crush_depth',
-        'deeper than crush_depth, or surfacing for good and sinking to nearer than drop_margin to '
-        'it before the pump, if it still can, or the weight stops that',
-        'crush_depth, drop_margin',
-        'deeper than its hull may bear, or about to be',
-        DROP,
-    ),
-    Row(
-        NEAR_BOTTOM,
-        'near_bottom',
-        'an altimeter hears the bottom closer than this, and the vehicle does not rise',
-        'altitude_min_m, altitude_s',
-        'too close to the bottom',
-    ),
-    Row(
-        OVERDEPTH,
-        'overdepth',
-        'deeper than any target so far, by a margin',
-        'overdepth_share, overdepth_m, overdepth_s',
-        'deeper than it was sent',
-    ),
-    Row(
-        NOT_CLIMBING,
-        'not_climbing',
-        'asked up and sent up, or with the whole pump out, and no progress upward',
-        'climb_progress_m, no_climb_s',
-        'does not climb',
-    ),
-    Row(
-        NOT_RISING,
-        'not_rising',
-        'surfacing for good, and no progress upward; not up, with the antenna out where that is '
-        'known, by the time that climb_mps takes, and some more; or it sinks with the pump out, '
-        'and leaks, is too heavy or was up before; or it leaks, and nobody knows',
-        'climb_progress_m, drop_after_s, drop_blind_s, climb_mps',
-        'does not rise though all is done for it',
-        DROP,
-    ),
+    Row(ORDERED, 'surface_ordered', 'ordered to the surface'),
+    Row(TOO_DEEP, 'too_deep', 'deeper than the vehicle is rated for'),
+    Row(CRUSHING, 'crush_depth', 'deeper than its hull may bear, or about to be', DROP),
+    Row(NEAR_BOTTOM, 'near_bottom', 'too close to the bottom'),
+    Row(OVERDEPTH, 'overdepth', 'deeper than it was sent'),
+    Row(NOT_CLIMBING, 'not_climbing', 'does not climb'),
+    Row(NOT_RISING, 'not_rising', 'does not rise though all is done for it', DROP),
     Row(
         TOO_HEAVY,
         'too_heavy',
-        'sinks faster, or rises more slowly, than pump and ballast would have it, or will by the '
-        'end of its dive',
-        'weight_share, weight_s',
         'heavier than its pump says: water in the hull, growth, or a wing that is lost',
     ),
-    Row(
-        STALLED,
-        'stalled',
-        'under water at the same depth; if it is asked down, no deeper by four times as much, '
-        'unless it rises by 24 times as much',
-        'stalled_m, stalled_s',
-        'stays at one depth',
-    ),
-    Row(
-        UNDER_LONG,
-        'under_too_long',
-        'under water without a break',
-        'under_water_s',
-        'has been under water for too long',
-    ),
+    Row(STALLED, 'stalled', 'stays at one depth'),
+    Row(UNDER_LONG, 'under_too_long', 'has been under water for too long'),
     Row(
         FROZEN,
         'measurement_frozen',
-        'the measured depth does not go where the vertical rate, or pump and pitch, lead, shows '
-        'the same to the last bit, or nothing measured moves',
-        'lag_share, lag_m, led_m, still_s',
         'the measured depth stands still, or goes elsewhere than pump and pitch lead, or the '
         'vehicle lies aground or on denser water',
     ),
-    Row(
-        DEPTH_OFFSET,
-        'depth_offset',
-        'with the antenna out of the water the depth is not 0: that is taken off',
-        'offset_max_m',
-        'the depth is not 0 at the surface, and is corrected',
-        NOTE,
-    ),
-    Row(
-        DEPTH_WRONG,
-        'depth_wrong',
-        'at the surface the depth is not 0 by more than that, it is that far above the water, or '
-        'under water it jumps and stays there',
-        'offset_max_m, jump_m, gate.hold_s',
-        'the measured depth is wrong at the surface, or has jumped',
-    ),
-    Row(
-        DISAGREES,
-        'depth_disagrees',
-        'pressure and odom tell different depths',
-        'disagree_m, disagree_s',
-        'pressure and odom tell different depths',
-    ),
-    Row(
-        CONTRADICTED,
-        'fixes_contradict',
-        'one of the last six surfacings was farther from where navigation had it than its '
-        'covariance and the change of drift at the surface explain: guidance surfaces after every '
-        'dive',
-        '',
-        'a fix contradicts navigation',
-        NOTE,
-    ),
+    Row(DEPTH_OFFSET, 'depth_offset', 'the depth is not 0 at the surface, and is corrected', NOTE),
+    Row(DEPTH_WRONG, 'depth_wrong', 'the measured depth is wrong at the surface, or has jumped'),
+    Row(DISAGREES, 'depth_disagrees', 'pressure and odom tell different depths'),
+    Row(CONTRADICTED, 'fixes_contradict', 'a fix contradicts navigation', NOTE),
     Row(
         ASTRAY,
         'astray',
-        'two of the last six were',
-        '',
         'fixes contradict navigation again and again: a compass or its declination is wrong',
     ),
-    Row(
-        LOST,
-        'measurement_lost',
-        'no usable odom, joint_states or reference',
-        'gate.hold_s',
-        'nothing usable is measured',
-    ),
-    Row(
-        NO_DEMAND,
-        'demand_lost',
-        'no usable demand of control',
-        'gate.hold_s',
-        'control demands nothing usable',
-    ),
-    Row(LEAK, 'leak', 'water in the hull', 'health_s', 'there is water in the hull'),
-    Row(
-        VACUUM,
-        'vacuum',
-        'the hull does not hold its vacuum',
-        'vacuum_min_pa, vacuum_max_pa, health_s',
-        'the vacuum in the hull is not what it should be',
-    ),
-    Row(
-        BATTERY,
-        'battery',
-        'the battery gives less than it should, or what is left is less than is not usable',
-        'battery_min_v, energy, health_s',
-        'the battery is low',
-    ),
-    Row(
-        NO_CONTACT,
-        'no_contact',
-        'nobody has heard of the vehicle',
-        'contact_s',
-        'nobody has heard of it for too long',
-    ),
+    Row(LOST, 'measurement_lost', 'nothing usable is measured'),
+    Row(NO_DEMAND, 'demand_lost', 'control demands nothing usable'),
+    Row(LEAK, 'leak', 'there is water in the hull'),
+    Row(VACUUM, 'vacuum', 'the vacuum in the hull is not what it should be'),
+    Row(BATTERY, 'battery', 'the battery is low'),
+    Row(NO_CONTACT, 'no_contact', 'nobody has heard of it for too long'),
 )
 
 

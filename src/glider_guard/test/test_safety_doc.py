@@ -1,6 +1,6 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""docs/safety.md prints the rows of the code; run as a program, this file writes them anew."""
+"""docs/safety.md has the rows of the code; run as a program, this file writes them anew."""
 
 import re
 from pathlib import Path
@@ -25,24 +25,24 @@ def _with_default(name: str) -> str:
     return f'`{name}` {value:g}'
 
 
-def table() -> str:
-    """The rows as Markdown."""
-    lines = [HEADER, ('---',) * len(HEADER)]
-    for row in ROWS:
-        names = row.parameter.split(', ') if row.parameter else []
-        by = ', '.join(map(_with_default, names))
-        latches = 'yes' if row.latches else 'no'
-        lines.append(
-            (str(row.bit), f'`{row.name}`', row.trigger, by, REACTIONS[row.reaction], latches)
-        )
-    return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
-
-
 def _parts() -> tuple[str, str, str]:
     text = DOCUMENT.read_text(encoding='utf-8')
     before, _, rest = text.partition(_BEGIN)
     inside, _, after = rest.partition(_END)
     return before, inside.strip(), after
+
+
+def table() -> str:
+    """The rows as Markdown: when one holds, and by which fields, the document says by itself."""
+    said = [line.strip('| ').split(' | ') for line in _parts()[1].splitlines()[2:]]
+    told = {cells[1].strip('`'): cells[2:-2] for cells in said}
+    lines = [HEADER, ('---',) * len(HEADER)]
+    for row in ROWS:
+        when, *by = told[row.name]
+        by = ', '.join(map(_with_default, re.findall('`([^`]+)`', ''.join(by))))
+        latches = 'yes' if row.latches else 'no'
+        lines.append((str(row.bit), f'`{row.name}`', when, by, REACTIONS[row.reaction], latches))
+    return '\n'.join(f'| {" | ".join(line)} |' for line in lines)
 
 
 def test_the_document_prints_every_row():
