@@ -32,7 +32,7 @@ from glider_model.ocean.density import depth_at
 from glider_model.plant.block import plant_outputs
 from glider_model.plant.energy import battery_of
 from glider_model.plant.plant import plant_odometry, plant_step
-from glider_model.plant.readings import health_of
+from glider_model.plant.sensors import health_of
 from glider_navigation.block import navigation_tick
 from glider_navigation.phase import AT_SURFACE, FIXED
 

@@ -37,9 +37,8 @@ from glider_mission.recording.ros.node_settings import read_settings
 from glider_mission.recording.ros.recorded_run import Recording, Series
 from glider_mission.recording.ros.verify import every_block
 from glider_mission.recording.ros.verify.check import IDENTICAL
-from glider_mission.recording.ros.verify.every_block import report, verify
+from glider_mission.recording.ros.verify.every_block import place_ticks, report, verify
 from glider_mission.recording.ros.verify.free_running import _by_stamp, free_running
-from glider_mission.recording.ros.verify.lockstep import place_ticks
 from glider_mission.run_folder import make_run_folder
 from glider_mission.scenario import load_scenario
 from glider_navigation.block import NAVIGATION

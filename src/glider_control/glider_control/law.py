@@ -16,7 +16,7 @@ from glider_base.signals import NOTHING_LEARNT, Adaptation, Reference
 from glider_base.slot import default, returns, slot
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.command_filter import FilterParams
-from glider_model.onboard.righting import rights_itself
+from glider_model.onboard.moving_mass import rights_itself
 from glider_model.vehicle.file import Vehicle
 
 #: A glide that leaves less than this share of the righting at rest hardly stops a roll;

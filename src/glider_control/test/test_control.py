@@ -26,7 +26,7 @@ from glider_control.stall import BEGINS_S, leave_stall, watch_stall
 from glider_control.vertical_rate import Trim, rate_error, vertical_rate_law
 from glider_model.onboard.attitude_filter import Measured
 from glider_model.onboard.glide_polar import glide_net_heaviness, glide_vertical_rate
-from glider_model.onboard.righting import Righting
+from glider_model.onboard.moving_mass import Righting
 from glider_model.plant.plant import PlantSettings, plant_odometry, plant_step
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_names

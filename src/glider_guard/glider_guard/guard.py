@@ -25,7 +25,6 @@ from glider_guard.depth import (
     sinking_rate,
     sound,
 )
-from glider_guard.health import HealthLimits, HealthState, check_health
 from glider_guard.rows import row
 from glider_guard.weight import (
     INITIAL_WEIGHT,
@@ -63,6 +62,43 @@ from glider_model.onboard.glide_polar import glide_attacks
 
 #: So many of the last six surfacings end the mission, whose fixes contradict navigation.
 TOO_MANY = 2
+
+
+class HealthLimits(NamedTuple):
+    """What health sensors may say."""
+
+    vacuum_min: float  #: (Pa)
+    vacuum_max: float
+    battery_min: float  #: (V)
+    reserve: float  #: share of the battery that is kept for coming home (-)
+    contact_s: float  #: infinite: any
+    health_s: float  #: for so long it may be otherwise
+
+
+class HealthState(NamedTuple):
+    """For how long each has not been well (s)."""
+
+    leak_s: float = 0.0
+    vacuum_s: float = 0.0
+    battery_s: float = 0.0
+
+
+@kernel
+def check_health(state, health, battery, limits, dt):
+    """Health a tick later (`HealthState`), and the rows that hold; less than 0 is not measured."""
+    vacuum = health.vacuum_pa
+    is_off = vacuum >= 0.0 and not limits.vacuum_min <= vacuum <= limits.vacuum_max
+    is_low = 0.0 <= battery.voltage < limits.battery_min
+    is_low = is_low or 0.0 <= battery.percentage < limits.reserve
+    state = HealthState(
+        state.leak_s + dt if health.leak > 0.5 else 0.0,
+        state.vacuum_s + dt if is_off else 0.0,
+        state.battery_s + dt if is_low else 0.0,
+    )
+    reported = row(rows.LEAK, state.leak_s > limits.health_s)
+    reported |= row(rows.VACUUM, state.vacuum_s > limits.health_s)
+    reported |= row(rows.BATTERY, state.battery_s > limits.health_s)
+    return state, reported | row(rows.NO_CONTACT, health.contact_age_s > limits.contact_s)
 
 
 class GuardParams(NamedTuple):

@@ -11,8 +11,7 @@ from glider_base.signals import Joints
 from glider_guard.actuators import make_limits
 from glider_guard.ascent import AscentLimits
 from glider_guard.depth import DepthLimits
-from glider_guard.guard import INITIAL_GUARD, GuardParams, GuardState
-from glider_guard.health import HealthLimits
+from glider_guard.guard import INITIAL_GUARD, GuardParams, GuardState, HealthLimits
 from glider_guard.weight import ARRIVED, WeightLimits
 from glider_guard.witness import WitnessLimits
 from glider_model.onboard.gate import GateSettings

@@ -20,8 +20,7 @@ from glider_model.plant.plant import (
     dive_m,
     plant_step,
 )
-from glider_model.plant.readings import make_readings
-from glider_model.plant.sensors import NO_SAMPLE, SensorSettings
+from glider_model.plant.sensors import NO_SAMPLE, SensorSettings, make_readings
 from glider_model.vehicle.energy import NO_ENERGY
 from glider_model.vehicle.file import load_vehicle
 

@@ -10,7 +10,7 @@ import pytest
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_S, Joints, Water
 from glider_model.plant.plant import PlantSettings, plant_step, tell
-from glider_model.plant.readings import make_readings, noise_of_readings, read
+from glider_model.plant.sensors import make_readings, noise_of_readings, read
 from glider_model.vehicle.actuators import actuators_step, toward
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
 

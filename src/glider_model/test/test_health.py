@@ -8,7 +8,7 @@ from glider_base.signals import TICK_S, Health, Joints
 from glider_base.wiring import PLANT
 from glider_model.plant.block import plant_move, plant_outputs
 from glider_model.plant.plant import PlantSettings
-from glider_model.plant.readings import VACUUM_PA
+from glider_model.plant.sensors import VACUUM_PA
 
 STILL = (0.0, 0.0, 0.0)
 

@@ -21,8 +21,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from glider_base.signals import TICK_S, Joints, Water
-from glider_model.plant.exponential import phi_functions
-from glider_model.plant.motion import Motion, derivative, integrate
+from glider_model.plant.motion import Motion, derivative, integrate, phi_functions
 from glider_model.vehicle.file import load_vehicle
 from glider_model.vehicle.rigid_body import make_inertia
 

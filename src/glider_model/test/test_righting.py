@@ -4,7 +4,7 @@
 
 import pytest
 
-from glider_model.onboard.righting import make_righting, rights_itself
+from glider_model.onboard.moving_mass import make_righting, rights_itself
 from glider_model.plant.trim import solve_trim
 from glider_model.vehicle.file import load_vehicle, vehicle_names
 

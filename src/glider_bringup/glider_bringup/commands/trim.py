@@ -14,8 +14,8 @@ from glider_base.settings import ConfigurationError
 from glider_bringup.console import Json, changed_fields, messages, print_table
 from glider_mission.changes import split_changes
 from glider_model.plant.trim import solve_trim
-from glider_model.vehicle.coefficients import LIFT_AND_DRAG
 from glider_model.vehicle.file import changed_vehicle, load_vehicle
+from glider_model.vehicle.sections import LIFT_AND_DRAG
 
 app = typer.Typer()
 

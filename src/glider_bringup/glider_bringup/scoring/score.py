@@ -50,7 +50,7 @@ from glider_mission.rules import Rules
 from glider_mission.scenario import Scenario
 from glider_model.ocean.bottom import NO_BOTTOM
 from glider_model.plant.plant import DIVED_M, NO_DIVES, dives_after
-from glider_model.plant.readings import make_readings, noise_of_readings
+from glider_model.plant.sensors import make_readings, noise_of_readings
 from glider_model.vehicle.file import load_vehicle
 
 #: Heading fluctuation is about the mean over this time (s).

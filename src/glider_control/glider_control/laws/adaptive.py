@@ -25,7 +25,7 @@ from glider_model.onboard.learnt_steering import (
     learn,
     steer_to,
 )
-from glider_model.onboard.righting import Righting, make_righting
+from glider_model.onboard.moving_mass import Righting, make_righting
 from glider_model.vehicle.file import Vehicle
 
 #: Integrals are held within this (N m).

@@ -29,7 +29,7 @@ from glider_base.signals import NOTHING_LEARNT
 from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
 from glider_control.law import Bank, bank_carefully, law_learnt, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
-from glider_model.onboard.righting import Righting, make_righting
+from glider_model.onboard.moving_mass import Righting, make_righting
 from glider_model.vehicle.file import Vehicle, VehicleParams
 from glider_model.vehicle.rigid_body import GRAVITY, rigid_body
 

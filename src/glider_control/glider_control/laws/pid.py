@@ -14,7 +14,7 @@ from glider_base.settings import derived, number
 from glider_control.heading import HeadingLawSettings, HeadingParams, heading_to_roll
 from glider_control.law import Bank, bank_carefully, law_step
 from glider_model.onboard.command_filter import Filtered, FilterParams, filter_command
-from glider_model.onboard.righting import Righting, make_righting
+from glider_model.onboard.moving_mass import Righting, make_righting
 from glider_model.vehicle.file import Vehicle
 
 

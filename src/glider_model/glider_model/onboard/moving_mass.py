@@ -1,8 +1,11 @@
 # Copyright 2026 The glider stack authors
 # SPDX-License-Identifier: Apache-2.0
-"""What a scale and a ruler tell of the moving mass, and the first moments that it makes.
+"""What a scale and a ruler tell of the moving mass: first moments, and what rights a vehicle.
 
-The oil of a buoyancy engine that is not at the centre of buoyancy makes one too.
+The oil of a buoyancy engine away from the centre of buoyancy makes a first moment too. At rest the
+weight below its buoyancy rights a vehicle. Under way the slip rolls it too, by its dihedral: back
+in the dive, further over in the climb. S_z + m_b K_MR / K_beta (docs/theory.md, 3) tells both; if
+it is less than nothing it rolls over by itself.
 """
 
 import math
@@ -52,3 +55,22 @@ def first_moments(m_b, x_p, mu, mass):
         mass.m_p * mass.R_p * math.sin(mu),
         mass.s_z + mass.m_p * mass.R_p * math.cos(mu),
     )
+
+
+class Righting(NamedTuple):
+    """What rights a vehicle at rest, and what its slip adds to that."""
+
+    at_rest: float  #: S_z with the roll mass in the middle (kg m)
+    lever: float  #: roll moment of a slip over its side force, K_MR / K_beta (m)
+
+
+def make_righting(vehicle: VehicleParams) -> Righting:
+    """Righting of a vehicle; without side force no slip is of account."""
+    lever = vehicle.K_MR / vehicle.K_beta if vehicle.K_beta else 0.0
+    return Righting(vehicle.s_z + vehicle.m_p * vehicle.R_p, lever)
+
+
+@kernel
+def rights_itself(m_b, share, righting):
+    """Whether a glide with net heaviness m_b (kg) leaves this share of the righting at rest."""
+    return righting.at_rest + m_b * righting.lever >= share * righting.at_rest

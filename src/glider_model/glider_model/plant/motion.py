@@ -8,6 +8,10 @@
 
 nu is the velocity through the water. v_c' is what the vehicle sees of a changing current, its own
 way through a shear included; it is the change over the last tick.
+
+Rates decay fast by their damping, x' = -pole x + n(x, t). Exponential Runge-Kutta of fourth order
+solves the decay exactly: Cox and Matthews (2002), J. Comput. Phys. 176, 430-455, eq. (26)-(29).
+Where the pole is zero this is the classical RK4 (docs/theory.md, 1).
 """
 
 import math
@@ -17,13 +21,16 @@ from glider_base.frames import rotate_to_body, rotate_to_ned
 from glider_base.kernel import kernel, replace
 from glider_base.signals import Joints
 from glider_model.ocean.density import emerged_fraction, immersed
-from glider_model.plant.exponential import decay_weights
 from glider_model.vehicle.hydrodynamics import hydrodynamics, rate_damping
 from glider_model.vehicle.rigid_body import GRAVITY, coriolis, make_inertia, solve_mass
 from glider_model.vehicle.surface import surface_loads
 
 #: Damping ratio of heave at the surface, where the hull radiates waves (-).
 SURFACE_DAMPING = 0.2
+#: Below this |z| phi_3 is summed up as a series: the closed form loses digits to cancellation.
+SERIES_BELOW = 0.5
+#: Terms of that series; what comes after them is below 1e-16 of the sum.
+SERIES_TERMS = 13
 
 
 class Motion(NamedTuple):
@@ -50,6 +57,52 @@ class Rates(NamedTuple):
     p: float
     q: float
     r: float
+
+
+class Decay(NamedTuple):
+    """Weights of a step for one pole."""
+
+    half: float  #: decay within half a step
+    half_input: float  #: weight of the input of half a step (s)
+    whole: float  #: decay within the step
+    first: float  #: weights of the inputs n_1, n_2 + n_3, n_4 (s)
+    middle: float
+    last: float
+
+
+@kernel
+def phi_functions(z):
+    """e^z, phi_1(z), phi_2(z), phi_3(z) for z <= 0."""
+    if z > -SERIES_BELOW:
+        phi_3 = 0.0
+        for k in range(SERIES_TERMS + 3, 3, -1):
+            phi_3 = (1.0 + phi_3) * z / k
+        phi_3 = (1.0 + phi_3) / 6.0
+        phi_2 = 0.5 + z * phi_3
+        phi_1 = 1.0 + z * phi_2
+        return 1.0 + z * phi_1, phi_1, phi_2, phi_3
+    decay = math.exp(z)
+    phi_1 = (decay - 1.0) / z
+    phi_2 = (phi_1 - 1.0) / z
+    return decay, phi_1, phi_2, (phi_2 - 0.5) / z
+
+
+@kernel
+def decay_weights(pole, h):
+    """Weights of a step of ``h`` s for a pole (1/s, >= 0: decay)."""
+    half, half_1, half_2, half_3 = phi_functions(-0.5 * h * pole)
+    # from z to 2 z by sums of positive numbers, which lose nothing
+    phi_1 = 0.5 * (half + 1.0) * half_1
+    phi_2 = 0.25 * ((half + 1.0) * half_2 + half_1)
+    phi_3 = 0.125 * ((half + 1.0) * half_3 + half_2 + 0.5 * half_1)
+    return Decay(
+        half=half,
+        half_input=0.5 * h * half_1,
+        whole=half * half,
+        first=h * (phi_1 - 3.0 * phi_2 + 4.0 * phi_3),
+        middle=h * (2.0 * phi_2 - 4.0 * phi_3),
+        last=h * (4.0 * phi_3 - phi_2),
+    )
 
 
 @kernel

@@ -22,14 +22,17 @@ from glider_model.plant.faults.kinds import FaultParams, NoFaultState, begun, su
 from glider_model.plant.faults.sensing import remembered, with_faults
 from glider_model.plant.faults.settings import FAULTS, Fault, fault_params, fault_state
 from glider_model.plant.motion import Motion, integrate
-from glider_model.plant.readings import Readings, health_of, make_readings, read
 from glider_model.plant.sensors import (
     ANTENNA_M,
     NO_SAMPLE,
+    Readings,
     Sample,
     SensorParams,
     SensorSettings,
     add_noise,
+    health_of,
+    make_readings,
+    read,
     sense,
     take_sample,
 )

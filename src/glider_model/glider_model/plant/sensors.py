@@ -18,7 +18,8 @@ compass and pitch sensor:
     phi_m   = phi + bias
 
 with D the declination: a compass turns in the magnetic field, and the chart gives it its north.
-A sensor that is sampled less often than each tick shows its last sample until the next.
+A sensor that is sampled less often than each tick shows its last sample until the next. The
+vehicle also says where its actuators are, with noise, and how it is.
 """
 
 import math
@@ -39,7 +40,7 @@ from glider_base.frames import (
 from glider_base.kernel import kernel, replace
 from glider_base.noise import normal_pair, random_stream, uniform
 from glider_base.settings import Settings, derived, matching, number
-from glider_base.signals import TICK_S, Imu, Odometry
+from glider_base.signals import TICK_S, Health, Imu, Joints, Odometry
 from glider_base.wiring import ALTIMETER_REACH_M, NO_ECHO, SENSORS
 from glider_model.ocean.density import pressure_at
 
@@ -53,6 +54,9 @@ ANTENNA_M = 0.5
 FIX_ERROR_TICKS = 600
 #: Status of a NavSatFix without a fix, and with one.
 NO_FIX, HAS_FIX = -1.0, 0.0
+#: Pressure in a closed hull below that of the air (Pa): 7 inches of mercury, in the middle of what
+#: a Slocum accepts (4 to 12).
+VACUUM_PA = 23700.0
 
 
 class SensorSettings(Settings):
@@ -428,3 +432,42 @@ def sense(odometry, height, joints, sample, out_ticks, surfacings, tick, params)
         (x.altitude,),
         (joints.m_b, joints.x_p, joints.mu, joints.delta),
     )
+
+
+class Readings(NamedTuple):
+    """Noise of the positions as the kernels see it."""
+
+    stream: np.uint64  #: start of the random stream
+    std: Joints  #: standard deviations (kg, m, rad, rad)
+    is_noisy: bool  #: any of them is > 0
+
+
+def make_readings(vehicle, seed: int) -> Readings:
+    """Noise of the actuators of a vehicle (`VehicleParams`) under one seed."""
+    std = vehicle.errors.noise
+    return Readings(np.uint64(random_stream(seed, _STREAM_OFFSET, 3)), std, any(std))
+
+
+@kernel
+def noise_of_readings(tick, params):
+    """Noise of the positions at a tick (kg, m, rad, rad)."""
+    first = np.uint64(2) * np.uint64(tick)
+    n_1, n_2 = normal_pair(params.stream, first)
+    n_3, n_4 = normal_pair(params.stream, first + np.uint64(1))
+    std = params.std
+    return Joints(std.m_b * n_1, std.x_p * n_2, std.mu * n_3, std.delta * n_4)
+
+
+@kernel
+def read(joints, tick, params):
+    """Where actuators that are at ``joints`` say that they are; without noise the very same."""
+    if not params.is_noisy:
+        return joints
+    n = noise_of_readings(tick, params)
+    return Joints(joints.m_b + n.m_b, joints.x_p + n.x_p, joints.mu + n.mu, joints.delta + n.delta)
+
+
+@kernel
+def health_of(state):
+    """What the health sensors of a vehicle say at a tick (`Health`), all well but for contact."""
+    return Health(0.0, VACUUM_PA, state.surfacing.silent_ticks * TICK_S)
