@@ -96,6 +96,18 @@ def default(stub: Callable) -> Callable:
     return stub
 
 
+def only_for(params_type: type, otherwise: Callable) -> Callable:
+    """Make a slot of a kernel for one type of params; for all others there is ``otherwise``."""
+
+    def fill(function: Callable) -> Callable:
+        otherwise.__name__, otherwise.__doc__ = function.__name__, function.__doc__
+        filled = slot(default(otherwise))
+        filled.body(params_type)(function)
+        return filled
+
+    return fill
+
+
 def returns(*what: str | type) -> Callable:
     """Have a slot refuse bodies that return other than so many things: written under ``@slot``.
 

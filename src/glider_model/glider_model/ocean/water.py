@@ -24,7 +24,7 @@ from glider_base.frames import from_geodetic, on_chart
 from glider_base.kernel import kernel, replace
 from glider_base.settings import named, number
 from glider_base.signals import SEA_WATER_DENSITY, Vector, Water
-from glider_base.slot import default, slot
+from glider_base.slot import only_for
 from glider_model.ocean.bottom import NO_BOTTOM, FlatBottom
 from glider_model.ocean.cast import CastParams, cast_params, check_cast, density_of, read_cast
 from glider_model.ocean.columns import MAX_ROWS
@@ -114,16 +114,10 @@ def _in_model_water(depth, m_b, vehicle, params):
     return displacing(m_b, volume, compressibility, warmer, 1.0 + rise, depth, vehicle)
 
 
-@slot
-@default
+@only_for(ModelWaterParams, lambda whole, n, e, t_s, params: whole)
+@kernel
 def around(whole, n, e, t_s, params):
     """Something with ``density``, the params of the water, at a place (m) and time (s)."""
-    return whole
-
-
-@around.body(ModelWaterParams)
-@kernel
-def _around(whole, n, e, t_s, params):
     return replace(whole, density=replace(params, n=n, e=e, t_s=t_s))
 
 

@@ -12,7 +12,7 @@ from glider_base.frames import OriginSettings, quaternion_from_euler, rotate_to_
 from glider_base.kernel import kernel, replace
 from glider_base.settings import Settings, number
 from glider_base.signals import TICK_S, Joints, Odometry, Vector, Water, dive_m, not_finite
-from glider_base.slot import default, slot
+from glider_base.slot import only_for
 from glider_base.wiring import SENSORS
 from glider_model.ocean.bottom import NO_BOTTOM, BathymetrySettings, aground, bottom_depth
 from glider_model.ocean.water import WaterSettings, around, with_wind
@@ -271,16 +271,10 @@ def tell(state, params):
     return with_faults(numbers, state, params.sensors, params.faults)
 
 
-@slot
-@default
+@only_for(FaultParams, lambda state, faults, whole, params: faults)
+@kernel
 def _after_telling(state, faults, whole, params):
     """State of the faults for the next tick; ``whole`` is `PlantParams`."""
-    return faults
-
-
-@_after_telling.body(FaultParams)
-@kernel
-def _remember_measured(state, faults, whole, params):
     return remembered(faults, tell(state, whole), whole.sensors) if params.repeats else faults
 
 

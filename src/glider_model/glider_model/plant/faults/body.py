@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from glider_base.kernel import kernel, replace
 from glider_base.signals import Joints, Water
-from glider_base.slot import default, slot
+from glider_base.slot import only_for
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import FaultParams
 from glider_model.vehicle.actuators import actuators_step, pump_rate, toward
@@ -23,16 +23,15 @@ class Felt(NamedTuple):
     density: NamedTuple
 
 
-@slot
-@default
+@only_for(
+    FaultParams,
+    lambda joints, command, depth, vehicle, dt, total, params: actuators_step(
+        joints, command, depth, vehicle, dt
+    ),
+)
+@kernel
 def moved(joints, command, depth, vehicle, dt, total, params):
     """Where the actuators are, offsets apart, ``dt`` s later; ``total`` is of `summed`."""
-    return actuators_step(joints, command, depth, vehicle, dt)
-
-
-@moved.body(FaultParams)
-@kernel
-def _moved(joints, command, depth, vehicle, dt, total, params):
     v, off = vehicle, vehicle.errors.dead_band
     rate = pump_rate(joints.m_b, command.m_b, depth, v)
     return Joints(
@@ -50,16 +49,10 @@ def _one(position, target, limit, reach, dead_band, which, total):
     return toward(position, goal, limit, reach * total[kinds.RATE + which], dead_band)
 
 
-@slot
-@default
+@only_for(FaultParams, lambda joints, vehicle, total, params: joints)
+@kernel
 def acting(joints, vehicle, total, params):
     """Where actuators are that say they are at ``joints``."""
-    return joints
-
-
-@acting.body(FaultParams)
-@kernel
-def _acting(joints, vehicle, total, params):
     v = vehicle
     mu = _away(joints.mu, v.mu_max, 2, total)
     return Joints(
@@ -77,16 +70,10 @@ def _away(position, limit, which, total):
     return position if offset == 0.0 else min(limit, max(-limit, position + offset))
 
 
-@slot
-@default
+@only_for(FaultParams, lambda water, total, params: water)
+@kernel
 def blown(water, total, params):
     """Velocity of the water around the vehicle, gusts included (NED, m/s)."""
-    return water
-
-
-@blown.body(FaultParams)
-@kernel
-def _blown(water, total, params):
     return Water(
         water.v_n + total[kinds.BLOWS],
         water.v_e + total[kinds.BLOWS + 1],
@@ -94,16 +81,10 @@ def _blown(water, total, params):
     )
 
 
-@slot
-@default
+@only_for(FaultParams, lambda whole, total, params: whole)
+@kernel
 def felt(whole, total, params):
     """What a motion goes by: something with vehicle and density; ``whole`` is `PlantParams`."""
-    return whole
-
-
-@felt.body(FaultParams)
-@kernel
-def _felt(whole, total, params):
     v, drag, lift = whole.vehicle, total[kinds.DRAG], total[kinds.LIFT]
     vehicle = replace(
         v,

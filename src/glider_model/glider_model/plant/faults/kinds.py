@@ -14,7 +14,7 @@ from glider_base.frames import rotate_to_ned
 from glider_base.kernel import kernel
 from glider_base.noise import normal_pair, uniform
 from glider_base.signals import TICK_S
-from glider_base.slot import default, slot
+from glider_base.slot import only_for
 
 #: Kinds. A stuck actuator is a slow one, and a frozen sensor one that always drops out.
 LEAK, MASS, FOULING, LOOSE, GUST = range(5)
@@ -83,19 +83,13 @@ class FaultState(NamedTuple):
     shown: np.ndarray  #: float64[SHOWN]: what sensors showed at the tick before, if one repeats it
 
 
-@slot
-@default
+@only_for(FaultParams, lambda state, params: state.faults)
+@kernel
 def begun(state, params):
     """State of the faults at a tick, with those that begin then; ``state`` is the plant's.
 
     What was shown is that of the tick before still.
     """
-    return state.faults
-
-
-@begun.body(FaultParams)
-@kernel
-def _begun(state, params):
     faults, motion = state.faults, state.motion
     began = faults.began
     down = (
@@ -146,16 +140,10 @@ def any_begun(faults):
     return False
 
 
-@slot
-@default
+@only_for(FaultParams, lambda faults, tick, params: ())
+@kernel
 def summed(faults, tick, params):
     """What all faults, as of `begun`, add up to at a tick, float64[_SUM] by the places above."""
-    return ()
-
-
-@summed.body(FaultParams)
-@kernel
-def _summed(faults, tick, params):
     total = np.zeros(_SUM)
     total[DRAG] = total[LIFT] = 1.0
     total[RATE : RATE + 4] = 1.0

@@ -11,7 +11,7 @@ import numpy as np
 
 from glider_base.frames import euler_from_quaternion, quaternion_from_euler, swap_world
 from glider_base.kernel import kernel, replace
-from glider_base.slot import default, slot
+from glider_base.slot import only_for
 from glider_model.ocean.density import depth_at, pressure_at
 from glider_model.plant.faults import kinds
 from glider_model.plant.faults.kinds import (
@@ -35,19 +35,13 @@ NOTICED_KG = 0.01
 _METRES_PER_DEG = 111195.0
 
 
-@slot
-@default
+@only_for(FaultParams, lambda numbers, state, sensors, params: numbers)
+@kernel
 def with_faults(numbers, state, sensors, params):
     """Numbers of the topics of a tick, in the order of the plant's outputs, as faults make them.
 
     ``numbers`` are as without. ``state`` is that of the plant.
     """
-    return numbers
-
-
-@with_faults.body(FaultParams)
-@kernel
-def _with_faults(numbers, state, sensors, params):
     faults = begun(state, params)
     if not any_begun(faults):
         return numbers
