@@ -25,7 +25,7 @@ from glider_bringup.engines.direct import fly_blocks
 from glider_bringup.engines.flight import mission_of
 from glider_mission.blocks import COLUMNS
 from glider_mission.scenario import Scenario
-from glider_model.plant import exponential, motion, plant
+from glider_model.plant import motion, plant
 from glider_model.plant.plant import plant_step
 from glider_model.vehicle import hydrodynamics, rigid_body
 
@@ -52,7 +52,7 @@ SOURCES = Path(__file__).parent / 'floor'
 #: As fast as IEEE arithmetic in source order allows: no -ffast-math, no fused multiply-add.
 FLAGS = ['-std=c99', '-O3', '-march=native', '-ffp-contract=off']
 
-_MODULES = (rigid_body, hydrodynamics, exponential, motion, plant)
+_MODULES = (rigid_body, hydrodynamics, motion, plant)
 _SCALARS = {
     bool: (ctypes.c_bool, 'bool'),
     int: (ctypes.c_int64, 'int64_t'),
@@ -137,7 +137,7 @@ class Floor:
 
     def __init__(self, state, params) -> None:
         self._structs = Structs()
-        numbers = motion.Rates, rigid_body.Inertia, exponential.Decay
+        numbers = motion.Rates, rigid_body.Inertia, motion.Decay
         for value in (state, params, *(one(*len(one._fields) * (0.0,)) for one in numbers)):
             self._structs.declare(value)
         with TemporaryDirectory() as folder:
