@@ -10,7 +10,6 @@ import numpy as np
 
 from glider_bringup.scoring.card import fly_scored
 from glider_guard.witness import AFLOAT_M
-from glider_mission.choices import combination_of
 from glider_mission.scenario import load_scenario
 from glider_studies.paper.experiments import Experiment, make_study
 from glider_studies.paper.judges import Check
@@ -103,5 +102,5 @@ def experiment(seed: int) -> Experiment:
 
     first = FIRST + COUNT * seed
     tasks = {(one, way): (one, way) for one in range(first, first + COUNT) for way in WAYS}
-    loops = {combination_of(load_scenario('slocum_shelf'))}
+    loops = [load_scenario('slocum_shelf')]
     return make_study(NAME, seed, judge=judge, fly=fly_one, tasks=tasks, loops=loops, rows=rows)

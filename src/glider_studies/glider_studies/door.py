@@ -107,7 +107,7 @@ def sweep(
         with study.open_journal(plan, folder, resume) as journal:
             known = study.flown_cells(plan, journal)
             if not all(known):
-                loops = plan.combinations
+                loops = plan.loops()
                 with worker_pool(workers, scheduler, loops, compiling) as pool, bar as update:
                     study.fly_sweep(plan, journal, known, pool, update, lambda: None)
             study.write_result(plan, journal, folder / study.RESULT_FILE)

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from glider_bringup.scoring.card import fly_scored
-from glider_mission.choices import combination_of
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
 from glider_navigation.forecast import ForecastSettings
@@ -82,5 +81,5 @@ def experiment(seed: int) -> Experiment:
 
     seas = enumerate(SIZES, FIRST + len(SIZES) * seed)
     tasks = {(sea, *case): (sea, rms, *case) for sea, rms in seas for case in CASES}
-    loops = {combination_of(load_scenario('eddies_10d', {'orders': []}))}
+    loops = [load_scenario('eddies_10d', {'orders': []})]
     return make_study(NAME, seed, judge=judge, fly=fly_one, tasks=tasks, loops=loops, rows=rows)

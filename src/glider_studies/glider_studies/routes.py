@@ -11,7 +11,6 @@ import numpy as np
 
 from glider_bringup.scoring.card import fly_scored
 from glider_bringup.showing.words import hours_of
-from glider_mission.choices import combination_of
 from glider_mission.routing.plan import plan
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, write_sea
@@ -108,5 +107,5 @@ def experiment(seed: int) -> Experiment:
         ], {}
 
     tasks = {(sea, way): (sea, rms_mps, way) for sea, rms_mps in seas.items() for way in WAYS}
-    loops = {combination_of(load_scenario('eddies_10d', {'orders': []}))}
+    loops = [load_scenario('eddies_10d', {'orders': []})]
     return make_study(NAME, seed, judge=judge, fly=cross_one, tasks=tasks, loops=loops, rows=rows)

@@ -32,7 +32,7 @@ from glider_base.kernel import source_digest
 from glider_bringup.console import compiling, counter, messages
 from glider_bringup.engines.compiling import Tell, compile_loops
 from glider_bringup.engines.interrupts import interrupts_noted, stopped_by
-from glider_mission.choices import Combination
+from glider_mission.scenario import Scenario
 
 #: Tasks that are handed out ahead, for each thread of the workers.
 TASKS_AHEAD = 2
@@ -225,13 +225,13 @@ def _local_cluster(workers: int, folder: str) -> LocalCluster:
 def worker_pool(
     workers: int | None = None,
     scheduler: str | None = None,
-    combinations: Iterable[Combination] = (),
+    scenarios: Iterable[Scenario] = (),
     tell: Tell = lambda line: None,
 ) -> Iterator[Pool]:
     """Start worker processes, by default one per processor, or connect to those of a cluster.
 
     Whatever ends the block ends the workers that were started for it, at once. ``scheduler`` is
-    the address of that of a cluster, such as ``tcp://10.0.0.1:8786``. Loops for ``combinations``,
+    the address of that of a cluster, such as ``tcp://10.0.0.1:8786``. Loops of ``scenarios``,
     which they will fly, are compiled here, so that workers of this machine do not all compile the
     same; ``tell`` gets a line then. Raises ConfigurationError if no scheduler answers, or there
     are ``workers`` beside it.
@@ -244,7 +244,7 @@ def worker_pool(
     with ExitStack() as stack:
         stack.enter_context(dask.config.set(_CONFIG))
         if scheduler is None:
-            compile_loops(combinations, tell)
+            compile_loops(scenarios, tell)
             folder = stack.enter_context(tempfile.TemporaryDirectory(prefix='glider-'))
             with _interrupts_held_back():
                 cluster = _local_cluster(workers or os.cpu_count() or 1, folder)
@@ -268,18 +268,18 @@ def _connect(scheduler: str | LocalCluster) -> Client:
 def workers_at_work(
     workers: int | None,
     scheduler: str | None,
-    combinations: Iterable[Combination],
+    scenarios: Iterable[Scenario],
     flights: int,
     advice: Callable[[], str] = lambda: '',
 ):
     """Workers of a command; yields their pool, and the update of a bar of flights.
 
-    They fly laws with methods, ``combinations``. What ends their work early is named, with what
-    ``advice`` adds, and is the exit code.
+    They fly ``scenarios``, or alike. What ends their work early is named, with what ``advice``
+    adds, and is the exit code.
     """
     try:
         with (
-            worker_pool(workers, scheduler, combinations, compiling) as pool,
+            worker_pool(workers, scheduler, scenarios, compiling) as pool,
             counter('flying', flights) as update,
         ):
             yield pool, update

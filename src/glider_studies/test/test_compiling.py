@@ -84,24 +84,25 @@ def test_loops_are_there_before_workers_start(flown, monkeypatch):
     scenario = load_scenario(changes={'control.law': 'pid'})
     with (
         pytest.raises(StartedError),
-        workers.worker_pool(1, None, [combination_of(scenario)] * 2),
+        workers.worker_pool(1, None, [scenario] * 2),
     ):
         pass
     assert flown == [(types_of(scenario), 0)]
 
 
-def test_a_law_that_refuses_the_vehicle_of_others_is_told_by_its_flights(monkeypatch):
+def test_a_law_that_refuses_its_vehicle_is_told_by_its_flights(monkeypatch):
     def params(self, vehicle, bank):
         return (bank.limit / vehicle.volume.value,)  # zhang2021 has no volume
 
     monkeypatch.setattr(PidSettings, 'params', params)
-    compile_loops([Combination('pid', 'los_current')], pytest.fail)
+    scenario = load_scenario(changes={'control.law': 'pid'})
+    compile_loops([scenario], pytest.fail)
     with pytest.raises(ConfigurationError, match='control.law: params: .*test_compiling.py'):
-        mission_of(load_scenario(changes={'control.law': 'pid'}))
+        mission_of(scenario)
 
 
-def test_the_loop_of_a_vehicle_for_shallow_water_is_compiled_too(flown):
-    """It is not rated for the dives of the scenario that others are compiled with."""
-    scenario = load_scenario('slocum_shelf')
-    compile_loops([combination_of(scenario)], lambda line: None)
+@pytest.mark.parametrize('name', ['slocum_shelf', 'eddies_10d'])
+def test_the_loop_of_a_vehicle_for_shallow_water_or_of_a_sea_is_compiled_too(flown, name):
+    scenario = load_scenario(name)
+    compile_loops([scenario, load_scenario(name)], lambda line: None)
     assert flown == [(types_of(scenario), 0)]

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from glider_base.settings import find_field, unit_of
 from glider_bringup import cli
 from glider_mission.changes import overlap
+from glider_mission.choices import combination_of
 from glider_mission.scenario import Scenario, load_scenario
 from glider_studies.sweep.netcdf import make_dataset
 from glider_studies.sweep.plan import (
@@ -156,12 +157,13 @@ def test_laws_and_methods_of_all_cells_are_known(tmp_path):
     plan = plan_of(
         tmp_path, dimensions={'law': laws, 'los': {'kind': 'variants', 'variants': variants}}
     )
-    assert set(plan.combinations) == {
+    assert set(map(combination_of, plan.loops())) == {
         (law, method, 'known', False, '')
         for law in ('pid', 'adaptive')
         for method in ('los_current', 'los_zhang2021')
     }
-    assert plan_of(tmp_path).combinations == [('adaptive', 'los_current', 'known', False, '')]
+    (only,) = plan_of(tmp_path).loops()
+    assert combination_of(only) == ('adaptive', 'los_current', 'known', False, '')
 
 
 def test_vehicles_with_a_fin_have_a_loop_of_their_own(tmp_path):
@@ -169,7 +171,7 @@ def test_vehicles_with_a_fin_have_a_loop_of_their_own(tmp_path):
     vehicles = {'kind': 'values', 'field': 'vehicle', 'values': names}
     shallow = {'profile.depth_m': 150, 'profile.net_heaviness_kg': 0.2, 'initial.depth_m': 0}
     plan = plan_of(tmp_path, set=shallow, dimensions={'vehicle': vehicles})
-    assert [one.steered for one in plan.combinations] == ['', 'slocum_g2']
+    assert [combination_of(one).steered for one in plan.loops()] == ['', 'slocum_g2']
 
 
 def test_digest_is_that_of_the_inputs(tmp_path):

@@ -15,12 +15,10 @@ from glider_bringup.engines.direct import HeldMission
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_mission.blocks import ROW
-from glider_mission.choices import Combination
-from glider_mission.scenario import load_scenario
-from glider_model.vehicle.file import load_vehicle, vehicle_path
+from glider_mission.choices import Combination, combination_of
+from glider_mission.scenario import Scenario
+from glider_model.vehicle.file import steers_by, vehicle_path
 
-#: Depth of a profile that is compiled and not flown, if the vehicle is rated for it (m).
-DEPTH_M = 100.0
 #: Gets one line for a person; may return what is to be called when that is over.
 Tell = Callable[[str], Callable[[], None] | None]
 
@@ -45,30 +43,22 @@ def shown_once(combination: Combination, tell: Tell) -> Iterator[None]:
         ) from None
 
 
-def compile_loops(combinations: Iterable[Combination], tell: Tell) -> None:
-    """Have loops compiled that are not in the cache, before many processes need them at once.
+def compile_loops(scenarios: Iterable[Scenario], tell: Tell) -> None:
+    """Have loops of scenarios compiled that are not in the cache, before many processes need them.
 
     Raises KeyboardInterrupt after the loop that was being compiled.
     """
-    nothing = np.empty((0, ROW))
+    kinds: dict[tuple, Scenario] = {}
+    for one in scenarios:
+        surface, field = steers_by(one), type(one.current.field)
+        kinds.setdefault((*combination_of(one)[:-1], surface, field), one)
     with interrupts_noted() as interrupts:
-        for one in dict.fromkeys(combinations):
-            changes = {
-                'control.law': one.law,
-                'guidance.los.method': one.method,
-                'navigation.method': one.navigation,
-                'faults': [{'kind': 'no_contact'}] if one.breaks else [],
-            }
-            if one.steered:
-                vehicle = load_vehicle(one.steered)
-                changes['vehicle'] = one.steered
-                changes['profile.depth_m'] = min(DEPTH_M, vehicle.rated_depth_m)
-                changes['profile.net_heaviness_kg'] = 0.5 * vehicle.params().m_b_max
+        for one in kinds.values():
             try:
-                state, params = mission_of(load_scenario(changes=changes))
+                mission = mission_of(one)
             except ConfigurationError:
-                continue  # by a law that may take the vehicle of its flights: these will tell
-            with shown_once(one, tell):
-                HeldMission(state, params).fly(nothing)
+                continue  # its flights will tell
+            with shown_once(combination_of(one), tell):
+                HeldMission(*mission).fly(np.empty((0, ROW)))
             if interrupts:
                 raise KeyboardInterrupt(interrupts[0])

@@ -69,7 +69,7 @@ def experiments(
         make_result_folder(out, paper.RESULT_FILE)
     what = 'flights and plans' if routes.NAME in groups else 'flights'
     messages.print(f'{len(planned)} experiments, {total} {what}')
-    with workers_at_work(workers, scheduler, paper.combinations(planned), total) as (pool, update):
+    with workers_at_work(workers, scheduler, paper.scenarios(planned), total) as (pool, update):
         rows, records = paper.fly(planned, pool, update)
     result = paper.report(planned, rows)
     for entry, counts in zip(result['experiments'], records, strict=True):

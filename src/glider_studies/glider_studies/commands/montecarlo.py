@@ -67,7 +67,7 @@ def montecarlo(
     end; those that surfaced for good, were lost or failed are counted. Of less than 20 flights
     p95 is the worst.
     """
-    from glider_mission.choices import combination_of, number
+    from glider_mission.choices import number
     from glider_mission.run_folder import make_result_folder
     from glider_studies import montecarlo as study
 
@@ -79,8 +79,8 @@ def montecarlo(
     if out:
         make_result_folder(out, study.RESULT_FILE)
     messages.print(f'{scenario}: {plants} plants, each by {" and by ".join(laws)}')
-    loops = map(combination_of, scenarios.values())
-    with workers_at_work(workers, scheduler, loops, len(scenarios)) as (pool, update):
+    flown = scenarios.values()
+    with workers_at_work(workers, scheduler, flown, len(scenarios)) as (pool, update):
         flights, airframes = study.fly_plants(scenarios, pool, update)
     whole = study.report(scenario, fields, seed, faults, flights, airframes)
     if as_json:

@@ -74,7 +74,7 @@ def sweep(
         known = study.flown_cells(plan, journal)
         if not all(known):
             waits = partial(messages.print, 'no worker is connected: waiting for one')
-            loops = plan.combinations
+            loops = plan.loops()
             with workers_at_work(workers, scheduler, loops, plan.cells, advice) as (pool, update):
                 study.fly_sweep(plan, journal, known, pool, update, waits)
         with messages.status('writing the result'):

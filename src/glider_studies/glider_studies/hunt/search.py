@@ -3,13 +3,13 @@
 """Flies missions with their faults and without, and shrinks what goes wrong."""
 
 from collections import Counter
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from glider_bringup.engines.flight import fly
 from glider_bringup.scoring.card import fly_scored, scorecard
 from glider_guard.rows import LATCHED, ROWS
 from glider_mission.changes import run_command
-from glider_mission.choices import Combination, combination_of
 from glider_mission.scenario import Scenario
 from glider_studies.hunt.missions import Mission, draw_mission
 from glider_studies.hunt.oracle import Truth, Verdict, judge, unfounded
@@ -68,13 +68,11 @@ def _fly_mission(place: tuple[int, int]) -> Flown:
     return Flown(verdict, faults, latched, len(truth.depth) / 3600.0)
 
 
-def combinations(seed: int, flights: int) -> set[Combination]:
-    """What loops the flights need."""
-    found = set()
+def scenarios(seed: int, flights: int) -> Iterator[Scenario]:
+    """What is flown."""
     for number in range(flights):
         mission = draw_mission(seed, number)
-        found |= {combination_of(mission.load()), combination_of(mission.load([]))}
-    return found
+        yield from (mission.load(), mission.load([]))
 
 
 def command(mission: Mission, faults: list[dict[str, Any]]) -> str:
@@ -115,7 +113,7 @@ def experiment(seed: int, flights: int) -> Experiment:
         return table, {'flights': flights, **_wrong(table), 'hours': hours}
 
     places = {number: (seed, number) for number in range(flights)}
-    loops = combinations(seed, flights)
+    loops = scenarios(seed, flights)
     return make_study(
         NAME, seed, judge=judge_search, fly=_fly_mission, tasks=places, loops=loops, rows=rows
     )

@@ -10,7 +10,7 @@ anything worse turns a verdict to ``failed``.
 import json
 import math
 import operator
-from collections.abc import Callable, Collection, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from functools import cache, partial
 from itertools import product
 from pathlib import Path
@@ -24,7 +24,6 @@ from glider_bringup.scoring.one_hertz import SECOND, Record, Rows
 from glider_bringup.scoring.score import Scorer, scores_of
 from glider_guidance.los import crab_heading
 from glider_mission.changes import run_command
-from glider_mission.choices import Combination, combination_of
 from glider_mission.planned import horizontal_speed
 from glider_mission.scenario import Scenario, load_scenario
 from glider_model.ocean.current_settings import KNOT_MPS
@@ -103,7 +102,7 @@ class Experiment(NamedTuple):
     judge: Callable[[list[dict]], list[Check]]
     fly: Callable[[Any], Any] | None = None  #: what a worker does with a task
     tasks: dict[Hashable, Any] = {}
-    loops: Collection[Combination] = ()  #: what they need
+    loops: Iterable[Scenario] = ()  #: whose loops they need
     #: Rows, and what else is shown of all flights, of what came of each task.
     rows: Callable[[dict[Hashable, Any]], tuple[list[dict], dict[str, Any]]] | None = None
 
@@ -319,10 +318,10 @@ def fly(
     return [rows for rows, _ in found], [others for _, others in found]
 
 
-def combinations(experiments: list[Experiment]) -> Iterator[Combination]:
-    """What `fly` needs loops for."""
+def scenarios(experiments: list[Experiment]) -> Iterator[Scenario]:
+    """What `fly` needs the loops of."""
     for one in experiments:
-        yield from (combination_of(case.load()) for case in one.cases)
+        yield from (case.load() for case in one.cases)
         yield from one.loops
 
 

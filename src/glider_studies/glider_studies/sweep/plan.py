@@ -11,7 +11,8 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from decimal import Decimal
 from functools import cached_property, partial
 from pathlib import Path
@@ -34,7 +35,7 @@ from glider_base.settings import (
     validate,
 )
 from glider_mission.changes import overlap, run_command
-from glider_mission.choices import Combination, combination_of
+from glider_mission.choices import combination_of
 from glider_mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
@@ -266,7 +267,8 @@ class Plan:
         except ConfigurationError as error:
             raise ConfigurationError(f'{path}: {error}') from None
         # every value of every dimension, the first cell's first
-        checked = [one for number in range(len(self.axes)) for one in self.along(number)]
+        along = [self.along(number) for number in range(len(self.axes))]
+        checked = [one for scenarios in along for one in scenarios]
         if own := next((one.control.law for one in checked if type(one) is not Scenario), None):
             raise ConfigurationError(
                 f'{path}: control.law = {own!r}: of this program alone, workers do not know it '
@@ -278,12 +280,10 @@ class Plan:
             described = one.model_copy(update={'vehicle': vehicle_path(one.vehicle).stem})
             digest = hashlib.sha256(described.model_dump_json().encode()).hexdigest()
             self.scenarios.append(digest)
-        #: laws and methods that cells may have
-        found = [combination_of(one) for one in checked]
-        steered = {steers_by(one): its.steered for one, its in zip(checked, found, strict=True)}
-        parts = [dict.fromkeys(part) for part in zip(*(its[:-1] for its in found), strict=True)]
-        self.combinations = [
-            Combination(*them) for them in itertools.product(*parts, steered.values())
+        #: places along each dimension, one of each kind of loop
+        self._kinds = [
+            {(*combination_of(one)[:-1], steers_by(one)): i for i, one in enumerate(scenarios)}
+            for scenarios in along
         ]
         vehicles: dict[Path, str] = {}  # one of every vehicle file
         for one in checked:
@@ -354,6 +354,12 @@ class Plan:
     def command(self, cell: int) -> str:
         """Shell command that flies a cell by itself, where the sweep was started."""
         return run_command(self._scenario_name(), self.changes(cell))
+
+    def loops(self) -> Iterator[Scenario]:
+        """Scenarios that between them have the loops of all cells."""
+        for places in itertools.product(*(kinds.values() for kinds in self._kinds)):
+            with suppress(ConfigurationError):  # such cells fail, and say why
+                yield make_scenario(self.source, self._changes(places))
 
     @cached_property
     def first(self) -> Scenario:
