@@ -103,7 +103,8 @@ def test_bench_without_another_checkout_has_no_section_against(monkeypatch, opti
     import bench
 
     for name in bench.SECTIONS:
-        monkeypatch.setattr(f'{name}.measure', lambda progress, **given: {})
+        monkeypatch.setattr(f'{name}.measure', lambda progress, **given: {'figure': 1.0})
+        monkeypatch.setattr(f'{name}.MEANING', {'figure': 'what it says'})
     done = CliRunner().invoke(bench.app, options)
     assert done.exit_code == 0, done.output
     titles = [line.strip() for line in done.stdout.splitlines() if line.strip() in bench.SECTIONS]
