@@ -136,17 +136,17 @@ def test_geojson_is_valid_and_where_the_vehicle_was(export, flown):
 def test_a_straight_path_is_a_route_from_its_start_to_its_end(tmp_path):
     run = glider.fly('slocum_shelf', duration=60.0, out=tmp_path / 'run', bag=True)
     north_m = 111_132.9 - 559.8 * np.cos(np.radians(2.0 * 36.09))  # a degree, WGS84
-    (start, end) = tracks.chart_of(read_run(run.folder), None).route
+    start, end = (row[:2] for row in tracks.chart_of(read_run(run.folder), None).lines['route'])
     assert start == pytest.approx((36.0, 122.0), abs=1e-6)
     assert end == pytest.approx((36.0 + 20_000.0 / north_m, 122.0), abs=1e-4)
 
 
 def test_a_track_of_few_points_is_at_the_last_of_them_when_the_run_ends(flown, monkeypatch):
     monkeypatch.setattr(tracks, 'MOST_POINTS', 20)
-    for line in tracks.chart_of(read_run(flown.folder), 0.0).lines:
-        last_s = (np.datetime64(line.rows[-1].time[:-1]) - np.datetime64(0, 's')) / np.timedelta64(
-            1, 's'
-        )
+    lines = tracks.chart_of(read_run(flown.folder), 0.0).lines
+    for name in lines.keys() - {'route'}:
+        last = np.datetime64(lines[name][-1].time[:-1])
+        last_s = (last - np.datetime64(0, 's')) / np.timedelta64(1, 's')
         assert last_s == pytest.approx(flown.to_xarray().time.values[-1], abs=1.0)
 
 
@@ -319,7 +319,7 @@ def test_the_route_is_that_of_the_orders(tmp_path):
 def test_the_route_is_that_of_the_mission_until_the_time_of_an_order_comes(flown):
     run = read_run(flown.folder)
     late = {'at_s': run.traces.ticks * TICK_S, 'path': {'kind': 'straight', 'length_m': 2000.0}}
-    waypoints = tracks.chart_of(run, None).route
+    waypoints = tracks.chart_of(run, None).lines['route']
     orders = load_scenario('current_8deg', {'orders': [late]}).orders
     run = run._replace(scenario=run.scenario.model_copy(update={'orders': orders}))
-    assert tracks.chart_of(run, None).route == waypoints
+    assert tracks.chart_of(run, None).lines['route'] == waypoints

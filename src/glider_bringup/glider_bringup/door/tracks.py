@@ -39,13 +39,6 @@ class Row(NamedTuple):
     time: str = ''  #: UTC as ISO 8601; empty where nobody knows when it was
 
 
-class Line(NamedTuple):
-    """A way over the chart."""
-
-    name: str
-    rows: list[Row]
-
-
 class Point(NamedTuple):
     """A surfacing."""
 
@@ -59,19 +52,8 @@ class Chart(NamedTuple):
     """What of a run is on a chart."""
 
     name: str
-    route: list[tuple[float, float]]  #: waypoints: latitude, longitude (deg)
-    lines: list[Line]
+    lines: dict[str, list[Row]]  #: by their names: the route, by its waypoints, and the tracks
     surfacings: list[Point]
-
-    @property
-    def as_line(self) -> Line:
-        """The route as a line over the chart."""
-        return Line('route', [Row(*place) for place in self.route])
-
-    @property
-    def all_lines(self) -> list[Line]:
-        """The route, where there is one, and the tracks."""
-        return [self.as_line, *self.lines] if self.route else self.lines
 
 
 def start_of(scenario: Scenario, start: str | None) -> float | None:
@@ -112,14 +94,14 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
         return f'{moment:%Y-%m-%dT%H:%M:%SZ}'
 
     traces = flown.traces.thinned(MOST_POINTS)
-    samples, lines = traces.samples, []
+    samples, tracks = traces.samples, {}
     for name, of in (('track', 'track'), ('estimated track', 'believed')):
         columns = samples[f'{of}_north_m'], samples[f'{of}_east_m'], samples['track_depth_m']
         known = np.flatnonzero(np.isfinite(columns).all(axis=0))
         north, east, depth = (column[known] for column in columns)
         seconds = np.minimum(2.0 * traces.spacing_s * known, (traces.ticks - 1) * TICK_S)
         rows = zip(places(north, east), depth.tolist(), map(when, seconds), strict=True)
-        lines.append(Line(name, [Row(*one, round(m, 2), time) for one, m, time in rows]))
+        tracks[name] = [Row(*one, round(m, 2), time) for one, m, time in rows]
     surfacings = [
         Point(
             f'surfacing {number}',
@@ -134,15 +116,14 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
     if scenario.path.kind == 'straight' and not flown.is_rerouted:
         points = [points[0], points[-1]]  # a plotter takes a hundred points or so
     norths, easts = np.array([point[:2] for point in points]).T
-    return Chart(
-        scenario.name, places(norths, easts), [line for line in lines if line.rows], surfacings
-    )
+    lines = {'route': [Row(*place) for place in places(norths, easts)], **tracks}
+    return Chart(scenario.name, {name: rows for name, rows in lines.items() if rows}, surfacings)
 
 
-def _parts(line: Line) -> list[list[Row]]:
+def _parts(line: list[Row]) -> list[list[Row]]:
     """A line in parts on one side of the date line each, as RFC 7946 has it (section 3.1.9)."""
-    parts = [line.rows[:1]]
-    for one, after in itertools.pairwise(line.rows):
+    parts = [line[:1]]
+    for one, after in itertools.pairwise(line):
         if abs(after.longitude - one.longitude) > 180.0:
             edge = math.copysign(180.0, one.longitude)
             way = after.longitude + 2.0 * edge - one.longitude
@@ -169,14 +150,14 @@ def geojson(chart: Chart) -> bytes:
         return {'type': 'Feature', 'properties': about, 'geometry': geometry}
 
     features = []
-    for line in chart.all_lines:
+    for name, line in chart.lines.items():
         parts = _parts(line)
         inside = [[at(*row[:3]) for row in part] for part in parts]
-        when = [[row.time for row in part] for part in parts] if line.rows[0].time else []
+        when = [[row.time for row in part] for part in parts] if line[0].time else []
         kind = 'MultiLineString'
         if len(parts) == 1:
             kind, inside, when = 'LineString', inside[0], when and when[0]
-        about = {'name': line.name} | ({'times': when} if when else {})
+        about = {'name': name} | ({'times': when} if when else {})
         features.append(feature(kind, inside, **about))
     for point in chart.surfacings:
         about = {'name': point.name} | ({'time': point.time} if point.time else {}) | point.about
@@ -193,11 +174,11 @@ def kml(chart: Chart) -> bytes:
         return _element(kind, mode, _element('coordinates', ' '.join(places)))
 
     marks = []
-    for line in chart.all_lines:
-        is_deep = any(row.depth_m for row in line.rows)
+    for name, line in chart.lines.items():
+        is_deep = any(row.depth_m for row in line)
         parts = [shape('LineString', part, is_deep) for part in _parts(line)]
         whole = parts[0] if len(parts) == 1 else _element('MultiGeometry', *parts)
-        marks.append(_element('Placemark', _element('name', line.name), whole))
+        marks.append(_element('Placemark', _element('name', name), whole))
     for one in chart.surfacings:
         stamp = [_element('TimeStamp', _element('when', one.time))] if one.time else []
         place = shape('Point', [Row(*one.place)])
@@ -217,13 +198,14 @@ def gpx(chart: Chart) -> bytes:
         return _element(tag, *inside, lat=f'{row.latitude:.7f}', lon=f'{east:.7f}')
 
     inside = [at('wpt', Row(*one.place, None, one.time), one.name) for one in chart.surfacings]
-    if chart.route:
-        for part in _parts(chart.as_line):
-            route = (at('rtept', row) for row in part)
-            inside.append(_element('rte', _element('name', chart.name), *route))
-    for line in chart.lines:
+    for name, line in chart.lines.items():
+        if name == 'route':
+            for part in _parts(line):
+                route = (at('rtept', row) for row in part)
+                inside.append(_element('rte', _element('name', chart.name), *route))
+            continue
         parts = (_element('trkseg', *(at('trkpt', row) for row in part)) for part in _parts(line))
-        inside.append(_element('trk', _element('name', line.name), *parts))
+        inside.append(_element('trk', _element('name', name), *parts))
     return _text(_element('gpx', *inside, version='1.1', creator='glider stack', xmlns=GPX))
 
 
