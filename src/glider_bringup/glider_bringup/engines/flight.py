@@ -300,24 +300,22 @@ def fly(
     scenario: Scenario,
     sinks: Iterable[Sink] = (),
     progress: Progress | None = None,
-    mission: tuple[MissionState, MissionParams] | None = None,
 ) -> Outcome:
     """Fly with the direct engine; Ctrl-C ends it as aborted with what was flown.
 
     A number that is not finite ends it as failed, with what was flown before. So does a recording
     that is gone; a disk that takes no more ends it as aborted. Each sink is given every row, in
-    their order. ``mission`` is flown instead of `mission_of` the scenario. Raises
-    ConfigurationError if messages are to go wrong, for there are none.
+    their order. Raises ConfigurationError if messages are to go wrong, for there are none.
     """
     refuse_message_faults(scenario)
     sinks = tuple(sinks)
     status, reason, ticks = 'completed', '', 0
     with interrupts_noted() as interrupts:
-        state, params = mission or mission_of(scenario)
+        mission = mission_of(scenario)
         pilot = Pilot(scenario) if scenario.guidance.route == 'planned' else None
         start = time.perf_counter()
         try:
-            held = Held(scenario, (state, params), sinks, pilot)
+            held = Held(scenario, mission, sinks, pilot)
             for log in blocks_of(held.fly, TAKEN_TICKS):
                 for sink in sinks:
                     sink.add(log)

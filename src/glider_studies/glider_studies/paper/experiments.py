@@ -17,11 +17,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from glider_base.files import read_yaml
-from glider_bringup.engines.flight import fly as fly_mission
-from glider_bringup.engines.flight import mission_of
-from glider_bringup.scoring.card import finite
+from glider_bringup.scoring.card import finite, fly_scored
 from glider_bringup.scoring.one_hertz import SECOND, Record, Rows
-from glider_bringup.scoring.score import Scorer, scores_of
 from glider_guidance.los import crab_heading
 from glider_mission.changes import run_command
 from glider_mission.planned import horizontal_speed
@@ -71,7 +68,6 @@ class Case(NamedTuple):
     scenario: str
     changes: dict[str, Any] = {}
     measures: tuple[str, ...] = ('attitude',)
-    steering_of: str = ''  #: vehicle whose steering the PID is given; '': of the one it flies
     facts: dict[str, Any] = {}  #: goes into the row as it is
     drawn: bool = False  #: a record of it is kept for figures
 
@@ -80,14 +76,14 @@ class Case(NamedTuple):
         chosen = {'control.law': self.controller, 'guidance.los.method': self.guidance}
         return load_scenario(self.scenario, {**self.changes, 'dives': 0, **chosen})
 
-    def command(self) -> str | None:
-        """Shell command that flies it again; None if a scenario cannot say it."""
+    def command(self) -> str:
+        """Shell command that flies it again."""
         options = f'--duration full --controller {self.controller} --guidance {self.guidance}'
-        return None if self.steering_of else run_command(self.scenario, self.changes, options)
+        return run_command(self.scenario, self.changes, options)
 
     def key(self) -> str:
         """The same for flights that are one and the same."""
-        return json.dumps([*self[1:5], self.measures, self.steering_of])
+        return json.dumps([*self[1:5], self.measures])
 
 
 class Experiment(NamedTuple):
@@ -184,7 +180,6 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
         if 'labelled' in one:
             facts[one['labelled']] = names[0]
         scenario = fields.pop('scenario', one.get('scenario', experiment))
-        steering_of = fields.pop('steering_of', '')
         laws = fields.pop('laws', one.get('laws', ['adaptive', 'pid']))
         if 'plant' in fields:
             seed = fields.pop('plant')
@@ -197,7 +192,7 @@ def _cases(experiment: str, one: dict[str, Any]) -> list[Case]:
         name = one['named'].format(*names) if 'named' in one else ', '.join(names)
         measures = tuple(one.get('measures', ['attitude']))
         cases += [
-            Case(name, law, method, scenario, fields, measures, steering_of, facts, 'drawn' in one)
+            Case(name, law, method, scenario, fields, measures, facts, 'drawn' in one)
             for method in one.get('guidance', ['los_current'])
             for law in laws
         ]
@@ -252,16 +247,9 @@ def expectation(speed: float, current_mps: float, angle_deg: float) -> dict[str,
 def _fly_case(case: Case) -> tuple[dict[str, Any], Record | None]:
     """Fly one case in a worker: its row, and if it is drawn a record thin enough to hand on."""
     scenario = case.load()
-    state, params = mission_of(scenario)
-    if case.steering_of:
-        steering = load_vehicle(case.steering_of).steering_rates
-        law = params.control.law
-        heading = law.heading._replace(steering_dive=steering.dive, steering_climb=steering.climb)
-        control = params.control._replace(law=law._replace(heading=heading))
-        params = params._replace(control=control)
-    scorer, kept = Scorer(scenario), Rows(SECOND)
-    flight = fly_mission(scenario, [scorer, kept], mission=(state, params))
-    record, scores = Record(kept.result()), scores_of(scenario, scorer)
+    kept = Rows(SECOND)
+    flight, scores = fly_scored(scenario, [kept])
+    record = Record(kept.result())
     for measure in case.measures:
         scores.update(MEASURES[measure](record, scenario))
     row = _row(scores, flight.status == 'failed')
