@@ -221,6 +221,14 @@ def test_a_run_that_is_over_before_an_order_says_so_and_without_another_path_is_
         assert told['reason'].endswith('at 6,000 s')
 
 
+def test_a_run_whose_course_could_not_be_held_says_what_it_never_came_to():
+    changes = {'profile.depth_m': 100.0, 'current.speed_mps': 1.2, 'current.angle_deg': 90.0}
+    later = [{'at_s': 6000.0, 'depth_m': 50.0}]
+    told = glider.fly('current_8deg', {**changes, 'orders': later}).score
+    assert told['status'] == 'infeasible' and told['sim_time_s'] < 6000.0
+    assert told['reason'] == 'it never came to what it was ordered at 6,000 s'
+
+
 @pytest.mark.parametrize('start', [(-3.0, 5.0), (3.0, -5.0)])
 def test_a_box_is_flown_round_wherever_beside_its_start_it_begins(start):
     """On the one side its last leg is nearer than its first."""

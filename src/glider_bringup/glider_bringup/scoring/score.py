@@ -246,7 +246,7 @@ class Scorer:
         arrival = self._arrival(rules)
         missing = self._missing(depth, dives, arrival['arrival'], task, rules)
         status, reason = outcome_of(depth, reported, self._hull, infeasible, missing)
-        if status == COMPLETED and self._waiting:
+        if status in (COMPLETED, INFEASIBLE) and self._waiting:
             times = ', '.join(f'{order.at_s:,.0f} s' for order in self._waiting)
             left = f'it never came to what it was ordered at {times}'
             reason = f'{reason}; {left}' if reason else left
