@@ -157,6 +157,8 @@ def test_a_plan_counts_what_is_pumped_as_the_nose_goes_over_and_a_dive_that_is_b
         (['navigation.method=dead_reckoned', 'profile.surface_every_dives=2'], None),
         (['profile.net_heaviness_kg=0.14', 'profile.pitch_deg=20'], 'dives and climbs are not'),
         (['profile.climb_net_heaviness_kg=0.05'], 'climbs are not steered by roll'),
+        (['duration_s=1e5', 'vehicle.energy.capacity.value=9'], 'its battery has 8 Wh to use'),
+        (['duration_s=1e5', 'vehicle.energy.capacity.value=90'], None),
         (['profile.net_heaviness_kg=0.05', 'vehicle=slocum_g2'], None),
         (['profile.net_heaviness_kg=0.1', 'vehicle=seaglider'], None),
         (['water.bottom_m=150', 'profile.clearance_m=10'], None),

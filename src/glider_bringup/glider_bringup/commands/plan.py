@@ -14,6 +14,7 @@ from glider_bringup.console import Changes, Json, Named, changed_fields, counter
 from glider_bringup.showing.words import count, hours_of, span
 from glider_mission.chart import place_text
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario
+from glider_model.vehicle.file import load_vehicle
 
 app = typer.Typer()
 
@@ -76,13 +77,17 @@ def _report(made: Any, scenario: Scenario) -> dict[str, Any]:
 
 
 def _notes(made: Any, scenario: Scenario) -> list[str]:
-    """What a plan does not count, and what of its dives the bottom does not let be."""
+    """What a plan does not count, and what bottom and battery do not let be."""
     from glider_mission.planned import unballasted
     from glider_mission.routing.plan import bottom_under
 
     orders, profile = len(scenario.orders), scenario.profile
     notes = scenario.unsteered + unballasted(scenario)
     notes += [f'{count(orders, "order")} of the mission not counted'] if orders else []
+    energy = load_vehicle(scenario.vehicle).energy
+    usable_wh = energy.capacity.value * energy.usable.value if energy else math.inf
+    if made.wh is not None and made.wh > usable_wh:
+        notes.append(f'its battery has {usable_wh:,.0f} Wh to use: it is sent up on the way')
     if 'fix' in scenario.topics and not profile.surface_every_dives:
         notes.append('no surfacing for a fix: a vehicle that reckons its place is led astray')
     bottom_m = bottom_under(made.route.corners, scenario.bottom())
