@@ -146,12 +146,17 @@ def test_a_cast_in_netcdf(tmp_path):
     assert found.profile == [[0.0, 1025.0], [50.0, 1026.0], [400.0, 1029.5]]
 
 
+MEASURED = 'depth_m,temperature_degC,salinity_psu\n'
+
+
 @pytest.mark.parametrize(
     ('text', 'told'),
     [
         ('depth_m,sigma\n0,25\n', "column 'sigma' is unknown .allowed: depth_m, density_kgpm3, "),
         ('density_kgpm3\n1025\n', 'column depth_m is missing'),
         ('depth_m,salinity_psu\n0,35\n', 'column density_kgpm3 is missing .allowed: density'),
+        (MEASURED + '0,-999,35\n', 'row 2, column temperature_degC = -999.0 .allowed: >= -5'),
+        (MEASURED + '0,9,99.99\n', 'row 2, column salinity_psu = 99.99 .allowed: >= 0'),
         (
             'depth_m,density_kgpm3\n0,25.5\n',
             'row 1?2?, column density_kgpm3 = 25.5 .allowed: >= 950',

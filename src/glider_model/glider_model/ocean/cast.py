@@ -30,7 +30,7 @@ _STANDARD_NAMES = {
     'sea_water_salinity': 'salinity_psu',
 }
 #: What no water is beyond.
-DENSITY_RANGE, TEMPERATURE_RANGE = (950.0, 1100.0), (-5.0, 50.0)
+RANGES = dict(zip(COLUMNS[1:], ((950.0, 1100.0), (-5.0, 50.0), (0.0, 60.0)), strict=True))
 #: Latitude (deg) of the gravity by which pressure follows from depth.
 _LATITUDE = 45.0
 
@@ -91,14 +91,19 @@ def check_cast(rows: list[list[float]], names, source: str) -> None:
     """
     names, columns = list(names), ('depth_m', 'density_kgpm3', 'temperature_degC')
     check_rows(rows, names, source, columns, alike=True)
-    for name, row in zip(names, rows, strict=True):
-        limits = zip(columns[1:], row[1:], (DENSITY_RANGE, TEMPERATURE_RANGE), strict=False)
-        for column, number, (least, most) in limits:
-            if not least <= number <= most:
-                raise ValueError(
-                    f'{source}: row {name}, column {column} = {number!r} '
-                    f'(allowed: >= {least} and <= {most})'
-                )
+    for column, numbers in zip(columns[1:], [*zip(*rows, strict=True)][1:], strict=False):
+        _check_range(column, numbers, names, source)
+
+
+def _check_range(column: str, numbers, names, source: str) -> None:
+    """Refuse numbers of a column that no water has; ``names`` are those of their rows."""
+    least, most = RANGES[column]
+    for name, number in zip(names, numbers, strict=True):
+        if not least <= number <= most:
+            raise ValueError(
+                f'{source}: row {name}, column {column} = {float(number)!r} '
+                f'(allowed: >= {least} and <= {most})'
+            )
 
 
 def read_cast(path: Path) -> list[list[float]]:
@@ -122,7 +127,9 @@ def read_cast(path: Path) -> list[list[float]]:
     names = [name for name, _ in found]
     table = {name: np.array([row[name] for _, row in found]) for name in columns}
     if 'density_kgpm3' not in table:
-        measured = (table[name] for name in ('depth_m', 'temperature_degC', 'salinity_psu'))
+        for name in COLUMNS[2:]:
+            _check_range(name, table[name], names, source)
+        measured = (table[name] for name in ('depth_m', *COLUMNS[2:]))
         table['density_kgpm3'], _ = density_of(source, *measured)
     order = [name for name in ('depth_m', *COLUMNS[1:3]) if name in table]
     rows = [[float(number) for number in row] for row in zip(*map(table.get, order), strict=True)]
