@@ -280,10 +280,13 @@ def test_run_folder_bag_and_memory_give_the_same(flown, data, tmp_path):
     xarray.testing.assert_equal(once_more.to_xarray(), data)
 
 
-def test_run_over_nodes_gives_the_same_and_leaves_nothing(tmp_path, monkeypatch):
+@pytest.mark.parametrize('clearance_m', [0.0, 10.0])
+def test_run_over_nodes_gives_the_same_and_leaves_nothing(tmp_path, monkeypatch, clearance_m):
     monkeypatch.chdir(tmp_path)
-    over_nodes = glider.fly('survey', duration=3.0, engine='nodes')
-    directly = glider.fly('survey', duration=3.0)
+    fields = {'profile.clearance_m': clearance_m, 'water.bottom_m': 90.0}
+    over_nodes = glider.fly('survey', fields, duration=3.0, engine='nodes')
+    directly = glider.fly('survey', fields, duration=3.0)
+    assert over_nodes.score['status'] == 'completed'
     assert over_nodes.score['engine'] == 'nodes'
     assert over_nodes.folder is directly.folder is None
     xarray.testing.assert_equal(over_nodes.to_xarray(), directly.to_xarray())

@@ -335,8 +335,11 @@ class Scenario(Settings):
     def navigation_settings(self) -> NavigationSettings:
         """Settings of the navigation node."""
         sources = self.navigation, self.initial, self.sensors, self
-        forecast = self.resolved_current(self.navigation.forecast)
-        return _settings_of(NavigationSettings, *sources, forecast=forecast)
+        given = {
+            'forecast': self.resolved_current(self.navigation.forecast),
+            'also_fitted': [one for one in self.topics if one not in self.navigation.topics],
+        }
+        return _settings_of(NavigationSettings, *sources, **given)
 
     def guidance_settings(self) -> GuidanceSettings:
         """Settings of the guidance node."""
