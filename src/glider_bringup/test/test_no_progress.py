@@ -82,6 +82,15 @@ def test_who_skips_heads_for_the_next_waypoint():
     assert len(run.score['no_progress']['events']) == 1
 
 
+def test_the_next_waypoint_is_skipped_too_if_that_comes_no_nearer_either():
+    path = {'kind': 'waypoints', 'waypoints': [[0, 0], [3000, 0], [3000, 500], [-4000, 500]]}
+    told = fly('skip', path=path, **{'guidance.no_progress_surfacings': 1}).to_xarray()
+    told = told['no_progress'].values
+    begins = np.flatnonzero(np.diff(told) > 0) + 1
+    assert len(begins) == 2 and begins[1] < 9000  # in the first block that the engine flies
+    assert not told[begins + 1].any()
+
+
 def test_the_last_waypoint_is_not_skipped():
     run = fly('skip', path={'kind': 'waypoints', 'waypoints': [[0, 0], [3000, 0]]})
     assert (run.to_xarray()['reference_north'].values[-100:] >= 0.0).all()

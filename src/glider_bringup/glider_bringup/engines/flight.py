@@ -226,7 +226,8 @@ class Held:
     def _look(self, log: np.ndarray) -> None:
         """Note what guidance and battery reported at the last tick, and what it orders itself."""
         self._row = row = log[-1].copy()
-        before, self.past.no_progress = self.past.no_progress, int(row[_NO_PROGRESS])
+        before = int(log[-2, _NO_PROGRESS]) if len(log) > 1 else self.past.no_progress
+        self.past.no_progress = int(row[_NO_PROGRESS])
         self.past.stage, self.past.battery = int(row[_STAGE]), Battery(*row[_BATTERY].tolist())
         if self.past.no_progress and not before:
             order = reaction(self._settings, self.past.no_progress, row[_ODOM], self.past.tick)
