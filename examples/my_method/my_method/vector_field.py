@@ -31,7 +31,7 @@ class VectorFieldSettings(MethodSettings):
 
     def initial_state(self) -> 'VectorFieldState':
         """There is nothing that it keeps."""
-        return VectorFieldState(0)
+        return VectorFieldState()
 
 
 class VectorFieldParams(NamedTuple):
@@ -42,9 +42,7 @@ class VectorFieldParams(NamedTuple):
 
 
 class VectorFieldState(NamedTuple):
-    """Nothing; a tuple of numbers cannot be empty."""
-
-    nothing: int
+    """There is nothing that it keeps."""
 
 
 @kernel
