@@ -34,6 +34,12 @@ def combination_of(scenario: Scenario) -> Combination:
     )
 
 
+def loop_of(scenario: Scenario) -> tuple:
+    """What tells its loop from others: choices, the surface that steers, and the current."""
+    surface, field = steers_by(scenario), type(scenario.current.field)
+    return (*combination_of(scenario)[:-1], surface, field)
+
+
 def number(option: str, text: str, word: str, low: float, high: float) -> float:
     """Number of an option that also takes a word; ``option`` as it stands before its value."""
     try:

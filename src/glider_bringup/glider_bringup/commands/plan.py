@@ -85,9 +85,9 @@ def _notes(made: Any, scenario: Scenario) -> list[str]:
     notes = scenario.unsteered + unballasted(scenario)
     notes += [f'{count(orders, "order")} of the mission not counted'] if orders else []
     energy = load_vehicle(scenario.vehicle).energy
-    usable_wh = energy.capacity.value * energy.usable.value if energy else math.inf
-    if made.wh is not None and made.wh > usable_wh:
-        notes.append(f'its battery has {usable_wh:,.0f} Wh to use: it is sent up on the way')
+    if energy and made.wh is not None and made.wh > energy.usable_wh:
+        has = f'its battery has {energy.usable_wh:,.0f} Wh to use'
+        notes.append(f'{has}: it is sent up on the way')
     if 'fix' in scenario.topics and not profile.surface_every_dives:
         notes.append('no surfacing for a fix: a vehicle that reckons its place is led astray')
     bottom_m = bottom_under(made.route.corners, scenario.bottom())

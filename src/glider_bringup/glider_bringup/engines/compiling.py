@@ -15,9 +15,9 @@ from glider_bringup.engines.direct import HeldMission
 from glider_bringup.engines.flight import mission_of
 from glider_bringup.engines.interrupts import interrupts_noted
 from glider_mission.blocks import ROW
-from glider_mission.choices import Combination, combination_of
+from glider_mission.choices import Combination, combination_of, loop_of
 from glider_mission.scenario import Scenario
-from glider_model.vehicle.file import steers_by, vehicle_path
+from glider_model.vehicle.file import vehicle_path
 
 #: Gets one line for a person; may return what is to be called when that is over.
 Tell = Callable[[str], Callable[[], None] | None]
@@ -50,8 +50,7 @@ def compile_loops(scenarios: Iterable[Scenario], tell: Tell) -> None:
     """
     kinds: dict[tuple, Scenario] = {}
     for one in scenarios:
-        surface, field = steers_by(one), type(one.current.field)
-        kinds.setdefault((*combination_of(one)[:-1], surface, field), one)
+        kinds.setdefault(loop_of(one), one)
     with interrupts_noted() as interrupts:
         for one in kinds.values():
             try:

@@ -42,7 +42,7 @@ class EnergyScorer:
 
     def __init__(self, energy: EnergySettings | None) -> None:
         self._params = energy.params() if energy else NO_ENERGY
-        self._usable_wh = energy.usable.value * energy.capacity.value if energy else None
+        self._usable_wh = energy.usable_wh if energy else None
         self._ledger, self._surfacing = FULL, LAUNCHED
         self._last: np.ndarray | None = None
 

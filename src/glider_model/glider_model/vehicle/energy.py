@@ -44,6 +44,11 @@ class EnergySettings(Settings):
     call_power: required('W', 'of a call, above hotel_surface', **_Power)
     call_duration: required('s', 'of a call', ge=0.0, le=86400.0)
 
+    @property
+    def usable_wh(self) -> float:
+        """What the guard lets be taken from a fresh battery (Wh)."""
+        return self.usable.value * self.capacity.value
+
     def params(self) -> 'EnergyParams':
         """Kernel parameters."""
         surface = self.steering_surface.value if self.steering_surface else 0.0

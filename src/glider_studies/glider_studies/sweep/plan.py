@@ -35,7 +35,7 @@ from glider_base.settings import (
     validate,
 )
 from glider_mission.changes import overlap, run_command
-from glider_mission.choices import combination_of
+from glider_mission.choices import loop_of
 from glider_mission.scenario import (
     DEFAULT_SCENARIO,
     Scenario,
@@ -44,7 +44,7 @@ from glider_mission.scenario import (
     read_scenario,
     scenario_names,
 )
-from glider_model.vehicle.file import steers_by, vehicle_file, vehicle_path
+from glider_model.vehicle.file import vehicle_file, vehicle_path
 
 SWEEP_FOLDER = Path(__file__).parent / 'sweeps'
 #: No sweep has more cells: these take days, and 0.5 GB of memory when the result is written.
@@ -281,10 +281,7 @@ class Plan:
             digest = hashlib.sha256(described.model_dump_json().encode()).hexdigest()
             self.scenarios.append(digest)
         #: places along each dimension, one of each kind of loop
-        self._kinds = [
-            {(*combination_of(one)[:-1], steers_by(one)): i for i, one in enumerate(scenarios)}
-            for scenarios in along
-        ]
+        self._kinds = [{loop_of(one): i for i, one in enumerate(them)} for them in along]
         vehicles: dict[Path, str] = {}  # one of every vehicle file
         for one in checked:
             vehicles.setdefault(vehicle_path(one.vehicle), one.vehicle)
