@@ -12,6 +12,11 @@ from glider_model.vehicle.file import Vehicle
 ROOT = Path(__file__).resolve().parents[3]
 DOCUMENT = ROOT / 'docs' / 'safety.md'
 HEADER = ('bit', 'row', 'when', 'by', 'then', 'latches')
+#: What the guard is told of a vehicle and what it measures, and its gate: no limits of rows.
+FITTED = {
+    *('vehicle', 'pressure', 'altitude', 'depth_resolution_m', 'imu_period_s', 'imu_missed_share'),
+    *('position_std_m', 'gate'),
+}
 _BEGIN, _END = '<!-- table: guard -->', '<!-- end -->'
 
 
@@ -47,6 +52,12 @@ def table() -> str:
 
 def test_the_document_prints_every_row():
     assert _parts()[1] == table(), f'write it anew: ./glider python {Path(__file__).name}'
+
+
+def test_every_limit_of_the_guard_stands_by_a_row():
+    by = ''.join(line.split(' | ')[3] for line in _parts()[1].splitlines()[2:])
+    named = set(re.findall('`([^`]+)`', by))
+    assert set(GuardSettings.model_fields) - FITTED == named & set(GuardSettings.model_fields)
 
 
 def test_every_row_has_a_test():

@@ -77,6 +77,14 @@ def test_every_experiment_can_be_flown(planned):
             assert (scenario.control.law, scenario.guidance.los.method) == case[1:3]
 
 
+def test_a_pid_that_is_given_the_steering_of_another_vehicle_has_that_of_its_file(planned):
+    cases = [case for one in planned.values() for case in one.cases if 'PID of' in case.case]
+    assert cases
+    for case in cases:
+        steering = load_vehicle(case.load().vehicle).steering_rates
+        assert steering == load_vehicle(case.case.split()[-1]).steering_rates
+
+
 def test_paper_experiments_are_of_thirty_hours(planned):
     for name, angle in {'current_8deg': 8, 'current_10deg': 10, 'current_12deg': 12}.items():
         ways = {(case.controller, case.guidance) for case in planned[name].cases}
