@@ -91,7 +91,7 @@ def test_a_depth_that_it_is_not_rated_for_is_told_whatever_was_measured(deepest_
     [(1, 4000.0, 'completed'), (2, 4000.0, 'unfinished'), (2, 5000.0, 'completed')],
 )
 def test_a_mission_is_unfinished_if_its_time_is_over_before_its_dives(dives, lasts_s, status):
-    rules = Rules(0.0, 1000.0, dives=dives, duration_s=lasts_s)
+    rules = Rules(0.0, 1000.0, dives=dives, duration_s=lasts_s, dive_s=1800.0)
     told = scores(np.maximum(DIVE, 6.0), rules=rules)
     assert told['status'] == status
     deep = '; 6 m deep at the end'
@@ -148,6 +148,44 @@ def test_a_mission_that_ceased_to_dive_is_unfinished(fields, status):
     _, told = fly_scored(load_scenario('current_8deg', changes), [])
     assert (told['status'], told['dives'] > 0) == (status, True)
     assert told['reason'].startswith('no dive flown' if status == 'unfinished' else '')
+
+
+@pytest.mark.parametrize(
+    ('fields', 'orders', 'says'),
+    [
+        ({'dives': 3}, [{'hold': True}], 'held'),
+        ({'dives': 0, 'path.at_end': 'stop'}, [{'hold': True}], 'held'),
+        ({'dives': 0}, [{'hold': True, 'at_s': 60.0}], 'held'),
+        ({'dives': 0}, [{'hold': True}], ''),
+        ({'dives': 1}, [{'hold': True}], ''),
+        ({'dives': 3}, [{'hold': True}, {'resume': True, 'at_s': 3000.0}], ''),
+    ],
+)
+def test_a_mission_that_is_held_before_it_has_flown_is_unfinished(fields, orders, says):
+    yo = {'profile.depth_m': 100.0, 'profile.surface_every_dives': 1, 'profile.wait_s': 60.0}
+    told = [{'at_s': 1500.0, **order} for order in orders]
+    changes = {**yo, 'duration_s': 6000.0, 'orders': told, **fields}
+    _, told = fly_scored(load_scenario('current_8deg', changes), [])
+    assert told['status'] == ('unfinished' if says else 'completed')
+    assert told['reason'].startswith(says) and bool(told['reason']) == bool(says)
+
+
+def test_a_shallow_last_dive_is_none_where_there_was_no_time_for_a_deep_one():
+    """It counts two dives and is done, and has come up once."""
+    path = {'kind': 'straight', 'course_deg': 119.2, 'length_m': 800.0, 'at_end': 'stop'}
+    changes = {
+        'vehicle': 'seawing',
+        'perturb.net_heaviness_kg': 0.174,
+        'dives': 2,
+        'duration_s': 7262.0,
+        'path': path,
+        'profile.depth_m': 1000.0,
+        'profile.prepare_s': 0.0,
+        'orders': [{'at_s': 186.2, 'depth_m': 36.2}],
+    }
+    _, told = fly_scored(load_scenario('survey', changes), [])
+    assert (told['status'], told['dives']) == ('unfinished', 1)
+    assert told['reason'].startswith('afloat')
 
 
 def test_way_that_is_left_counts_that_the_vehicle_was_carried_back():

@@ -30,7 +30,7 @@ class Rules(NamedTuple):
     duration_s: float = math.inf  #: time that the mission has (s)
     origin: Origin | None = None  #: of its chart, if people read its places in degrees
     shallowest_m: float = math.inf  #: depth of dives by which they are counted, if less (m)
-    dives: int = 0  #: that it is to fly in its time; 0: so many as there are
+    dives: int = 0  #: that it is to fly, if there is time for them; 0: so many as there are
     dive_s: float = math.inf  #: time that is ample for a stay and a dive, if it is to fly some (s)
 
     @property

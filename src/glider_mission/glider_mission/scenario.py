@@ -400,7 +400,7 @@ class Scenario(Settings):
             duration_s=self.duration_s,
             origin=self.origin.params() if self.is_charted else None,
             shallowest_m=self.shallowest_m,
-            dives=min(self.dives, int(self.duration_s / dive_s)),
+            dives=self.dives,
             dive_s=dive_s,
         )
 

@@ -361,17 +361,21 @@ class Scorer:
         time_s, ended = seconds(self.ticks), self._end is not None
         if ended and arrival and not arrival['arrived']:
             return f'came up {arrival["missed_m"]:,.0f} m from the last point of its path'
+        is_done = 0 < rules.dives <= dives
         if rules.duration_s - time_s > TICK_S:
             # who has arrived, or is to go on, may be done before
-            drifts = (arrival or self._ordered) and not ended and not 0 < rules.dives <= dives
-            if rules.dives_at_all and drifts:
+            if (arrival or self._ordered) and not ended and not is_done:
                 return 'afloat for longer than it was to wait, before the end of its path'
             later_s = [one.at_s for one in self._waiting if one.path]
-            if later_s and min(later_s) < rules.duration_s and not 0 < rules.dives <= dives:
+            if later_s and min(later_s) < rules.duration_s and not is_done:
                 return f'over before another path was ordered, at {min(later_s):,.0f} s'
             return ''
-        if dives < rules.dives:
-            return f'dives flown, of those that there was time for: {dives} of {rules.dives}'
+        stays = [order for order in self._followed if order.hold or order.resume]
+        goes_on = dives < max(1, rules.dives) or (arrival and not ended and not is_done)
+        if stays and stays[-1].hold and goes_on:
+            return f'held at the surface as ordered at {stays[-1].at_s:,.0f} s, and not resumed'
+        if dives < (in_time := min(rules.dives, int(rules.duration_s / rules.dive_s))):
+            return f'dives flown, of those that there was time for: {dives} of {in_time}'
         is_led_aground = self._bottom and self._bottom.touched_tick is not None
         if rules.dives_at_all and not dives and (is_led_aground or not _dives_at_all(depth)):
             return 'no dive flown, for which there was time'
