@@ -11,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from functools import partial
 
 import numpy as np
@@ -20,6 +21,7 @@ import command_line
 from glider_base.frames import euler_from_quaternion
 from glider_base.ros.wire.topics import TOPICS
 from glider_base.settings import ConfigurationError
+from glider_bringup import cli
 from glider_bringup.door.run import chosen_scenario
 from glider_bringup.engines.direct import HeldMission
 from glider_bringup.engines.flight import mission_of
@@ -43,6 +45,7 @@ from glider_model.vehicle.perturb import (
     perturbed,
 )
 from glider_studies import montecarlo
+from glider_studies.commands import montecarlo as command
 from glider_studies.commands.montecarlo import _print_study
 from glider_studies.montecarlo import (
     NAVIGATION,
@@ -61,6 +64,7 @@ OPTIONS = [f'--set={field}={value}' for field, value in SHORT.items()]
 LAWS = ['adaptive', 'backstepping', 'pid']
 #: What is told of the navigation of a flight, but for surfacings; statuses of five flights.
 FLOWN = dict.fromkeys(NAVIGATION) | {'fixed': 0, 'surfacing_cross_track_m': []}
+NONE_UP = FLOWN | {'surfacings': 0, 'surfacing_error_m': []}
 STATUSES = ('completed', 'infeasible', 'completed', 'lost', 'surfaced')
 #: Topics whose numbers are compared.
 RECORDED = [name for name in COLUMNS if name in TOPICS]
@@ -281,6 +285,19 @@ def test_a_law_that_raises_ends_its_own_flight_only():
     told = [(one['outcome'], one['reason']) for one in flights.values()]
     assert told[0] == ('completed', '') and told[1][0] == 'failed'
     assert ': ValueError: none of yours at tick ' in told[1][1]
+
+
+@pytest.mark.parametrize(('status', 'code'), [('completed', 0), ('failed', 1)])
+def test_a_flight_that_failed_is_exit_code_one(tmp_path, monkeypatch, status, code):
+    from typer.testing import CliRunner
+
+    judged = {(0, 'pid'): judge(scores(navigation=NONE_UP), status)}
+    frame = {'unstable': 0, 'weak_steering': 0}
+    monkeypatch.setattr(montecarlo, 'fly_plants', lambda *a: (judged, {0: frame}))
+    monkeypatch.setattr(command, 'workers_at_work', lambda *a: nullcontext((None, None)))
+    options = ['montecarlo', '--plants', '1', '--controller', 'pid', '--out', str(tmp_path)]
+    assert CliRunner().invoke(cli.app, options).exit_code == code
+    assert (tmp_path / RESULT_FILE).is_file()
 
 
 def test_result_is_one_json_object_of_the_promised_shape(study):

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from glider_base.errors import EXIT_FAILED
 from glider_base.signals import TICK_S
 from glider_bringup.console import (
     Changes,
@@ -65,7 +66,7 @@ def montecarlo(
     vehicle reckons (navigation.method), its compass, pitch, depth and fixes are off too.
     With --faults each plant breaks too. Percentiles are of the flights that were flown to their
     end; those that surfaced for good, were lost or failed are counted. Of less than 20 flights
-    p95 is the worst.
+    p95 is the worst. Exit code 1 if a flight failed.
     """
     from glider_mission.choices import number
     from glider_mission.run_folder import make_result_folder
@@ -89,6 +90,8 @@ def montecarlo(
         _print_study(whole)
     if out:  # last: a disk that is full must not take what was flown
         write_whole(out / study.RESULT_FILE, json.dumps(whole, indent=2) + '\n')
+    if any('failed' in row['outcomes'] for row in whole['rows']):
+        raise typer.Exit(EXIT_FAILED)
 
 
 def _print_study(study: dict) -> None:
