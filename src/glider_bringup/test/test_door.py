@@ -775,9 +775,12 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
         (run_cell(CELL + LEARNT), {}, ['learnt (<ipython-input-1>', 'returns 2', 'roll_bias_nm']),
     ],
 )
-def test_law_that_cannot_be_flown_is_told(law, choices, words):
+def test_law_that_cannot_be_flown_is_told(law, choices, words, tmp_path):
+    """By its words, and it leaves no folder behind."""
+    folder = tmp_path / 'run'
     with pytest.raises(glider.ConfigurationError) as error:
-        glider.fly('current_8deg', law=law, **choices)
+        glider.fly('current_8deg', law=law, out=folder, bag=True, **choices)
+    assert not folder.exists()
     assert all(word in str(error.value) for word in words)
     assert len(str(error.value).splitlines()) == 1
 

@@ -46,7 +46,11 @@ def fly_recorded(
     recorded = recorded_topics(topics)
     bag = BagWriter(folder, scenario.name, attachments=attachments, topics=recorded, sync=sync)
     writer = LogWriter(bag, scenario.guidance_settings(), topics, steers_by(scenario))
-    flight = fly(scenario, [*sinks, writer], progress)
+    try:
+        flight = fly(scenario, [*sinks, writer], progress)
+    except ConfigurationError:  # such as a law that cannot be compiled
+        bag.discard()
+        raise
     try:
         if flight.status != 'aborted':
             writer.finish(flight.reason)

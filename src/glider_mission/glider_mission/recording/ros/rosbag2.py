@@ -138,8 +138,12 @@ class BagWriter:
         try:
             self.flush()
         except DiskError:
-            file.unlink(missing_ok=True)  # nothing is in it, and it would be in the way
+            self.discard()
             raise
+
+    def discard(self) -> None:
+        """Take the file away, of a flight that never began: it would be in the way."""
+        (self._folder / self._file_name).unlink(missing_ok=True)
 
     def write(self, topic: str, stamp_ns: int, payload: bytes) -> None:
         """Add a serialized message."""
