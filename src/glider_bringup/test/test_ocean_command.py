@@ -3,7 +3,6 @@
 """``./glider ocean``: what is in a file, whether it covers a mission, and its chart."""
 
 import json
-import math
 
 import matplotlib.image
 import numpy as np
@@ -73,14 +72,13 @@ def test_it_tells_what_is_in_a_file(sea_file, capsys):
 
 
 @pytest.mark.filterwarnings('error')
-def test_a_fill_that_is_not_declared_is_told_as_it_is(sea_file, tmp_path, capsys):
-    """What NetCDF fills with by itself is too large for its square as float32."""
-    path, fill = tmp_path / 'filled.nc', np.float32(9.96921e36)
+def test_a_fill_that_is_not_declared_is_refused_by_name(sea_file, tmp_path, capsys):
+    path = tmp_path / 'filled.nc'
     with xarray.open_dataset(sea_file) as sea:
-        sea.astype('float32').fillna(fill).to_netcdf(path, engine='scipy')
-    currents = told(capsys, path)['currents']
-    assert [one['high'] for one in currents['variables']] == [pytest.approx(fill)] * 2
-    assert currents['speed_mps']['rms'] == pytest.approx(math.sqrt(18 / 441) * fill)
+        sea.astype('float32').fillna(9.96921e36).to_netcdf(path, engine='scipy')
+    says = r'filled.nc: vo at 2026-03-03T00:00Z: 9.96921e\+36 m/s \(allowed: -10 to 10 m/s\)'
+    with pytest.raises(ConfigurationError, match=says):
+        told(capsys, path)
 
 
 @pytest.mark.parametrize('by', [['longitude'], []])

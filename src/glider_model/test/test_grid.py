@@ -200,6 +200,28 @@ def test_a_step_without_water_is_refused_by_its_time(change, says, tmp_path):
         grid(path, (36.0, 122.0))
 
 
+@pytest.mark.parametrize('packed', [False, True])
+@pytest.mark.parametrize(
+    'told',
+    [
+        {'valid_min': np.float32(-5.0), 'valid_max': np.float32(5.0)},
+        {'valid_range': np.array([-5.0, 5.0])},
+        {'valid_max': np.int16(5000)},
+    ],
+)
+def test_what_is_beyond_the_valid_numbers_of_a_variable_is_missing(told, packed, tmp_path):
+    """Whole numbers are limits of what is packed; a number at its limit is valid."""
+    data = dataset().clip(-4.0, 4.0)
+    data.uo[:, :, 8, 8], data.uo[:, :, 0, 0] = 9.0, 5.0
+    data.uo.attrs |= told
+    loaded = load(written(data, tmp_path / 'sea.nc', packed))
+    if packed or 'int16' not in str(told):
+        assert loaded.land[8, 8] and loaded.land.sum() == 1
+        assert abs(loaded.water[..., 1]).max() == pytest.approx(5.0)
+    else:
+        assert not loaded.land.any()
+
+
 @pytest.mark.parametrize(
     'told',
     [
@@ -452,6 +474,7 @@ def from_geodetic_all(latitudes, longitudes, origin):
     [
         ((30.0, 122.0), {'units': 'm'}, 'latitude of the path goes from 30.000'),
         ((36.0, 122.0), {'units': 'fathoms'}, "elevation: units = 'fathoms'"),
+        ((36.0, 122.0), {'units': 'm', 'scale_factor': 60.0}, 'elevation: 53760 m'),
     ],
 )
 def test_a_chart_that_does_not_serve_is_refused_by_name(place, attributes, text, tmp_path):

@@ -37,6 +37,7 @@ _LENGTHS = {
     **dict.fromkeys(('cm', 'centimeter', 'centimeters'), 0.01),
 }
 _AXES = ('time', 'depth', 'latitude', 'longitude')
+_VALID = ('valid_range', 'valid_min', 'valid_max')
 
 
 class Wanted(NamedTuple):
@@ -83,7 +84,7 @@ BOTTOM = (
             **{'deptho': 'sea_floor_depth_below_geoid', 'bathymetry': 'sea_floor_depth'},
             **{name: name for name in (*_HEIGHTS, *_BELOW)},
         },
-        *(_LENGTHS, 'm', -math.inf, math.inf),
+        *(_LENGTHS, 'm', -9000.0, 12000.0),
     ),
 )
 #: What a grid is for, and what is read of it; a file may have several.
@@ -389,7 +390,7 @@ def load(
         size = _bytes(layout, chosen)
         if size > MAX_BYTES:
             raise ValueError(f'{size:,} bytes of it are needed (allowed: <= {MAX_BYTES:,})')
-        return _read(layout, chosen, axes, () if wanted is BOTTOM else wanted)
+        return _read(layout, chosen, axes, wanted, wanted is not BOTTOM)
 
 
 def _bytes(layout: _Layout, chosen: dict[str, np.ndarray]) -> int:
@@ -475,12 +476,17 @@ def _hole(values: np.ndarray) -> tuple[float, float]:
 
 
 def _read(
-    layout: _Layout, chosen: dict[str, np.ndarray], axes: Axes, wanted: tuple[Wanted, ...] = ()
+    layout: _Layout,
+    chosen: dict[str, np.ndarray],
+    axes: Axes,
+    wanted: tuple[Wanted, ...],
+    is_needed: bool = False,
 ) -> Loaded:
     """Numbers of a window, with the nearest water in place of land and bottom.
 
-    A step without any, and numbers that are none of what is ``wanted``, are refused. A bottom
-    without a number is as far above the sea as the nearest of it is from its surface.
+    Numbers that are none of what is ``wanted`` are refused, and a step without any where each
+    ``is_needed``. A bottom without a number is as far above the sea as the nearest of it is from
+    its surface.
     """
     shape = tuple(len(one) for one in axes)
     water = np.empty((*shape, len(layout.variables)), dtype=np.float32)
@@ -491,9 +497,8 @@ def _read(
         for component, name in enumerate(layout.variables):
             read = _cut(layout.dataset[name], present, now).reshape(shape[1:])
             read = layout.scales[component] * read
-            if wanted:
-                what = f'{name} at {time_text(axes.times[step])}'
-                _refuse_no_water(what, read, wanted[component])
+            what = name if is_bottom else f'{name} at {time_text(axes.times[step])}'
+            _refuse_no_water(what, read, wanted[component], is_needed)
             dry = ~np.isfinite(read)
             filled = _fill_land(read)
             if is_bottom:
@@ -505,13 +510,13 @@ def _read(
     return Loaded(axes, water, layout.standards, land)
 
 
-def _refuse_no_water(what: str, read: np.ndarray, wanted: Wanted) -> None:
-    """Refuse numbers of a step that are missing, or are none of the sea."""
+def _refuse_no_water(what: str, read: np.ndarray, wanted: Wanted, is_needed: bool) -> None:
+    """Refuse numbers of a step that are none of the sea, or missing where some are needed."""
     found = read[np.isfinite(read)]
     allowed = f'{wanted.least:g} to {wanted.most:g} {wanted.unit}'
-    if not len(found):
+    if is_needed and not len(found):
         raise ValueError(f'{what}: no number around the mission (allowed: {allowed})')
-    for one in (float(found.min()), float(found.max())):
+    for one in (float(found.min()), float(found.max())) if len(found) else ():
         if not wanted.least <= one <= wanted.most:
             raise ValueError(f'{what}: {one:g} {wanted.unit} (allowed: {allowed})')
 
@@ -520,13 +525,31 @@ def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.nd
     """Numbers of a variable where they are chosen along its axes, in the order of these."""
     import xarray
 
+    low, high = _valid(part.attrs, part.encoding)
     for axis, dimension in axes.items():
         pieces = [part.isel({dimension: run}) for run in _runs(chosen[axis])]
         if len(pieces) > 1:
             pieces = [xarray.concat([piece.load() for piece in pieces], dimension)]
         (part,) = pieces
     # read first: of packed NetCDF 3 xarray transposes nothing that it has not read
-    return np.asarray(part.load().transpose(*axes.values()).values, dtype=float)
+    numbers = np.asarray(part.load().transpose(*axes.values()).values, dtype=float)
+    return np.where((numbers < low) | (numbers > high), np.nan, numbers)
+
+
+def _valid(attrs: dict, packed: dict) -> tuple[float, float]:
+    """Least and most that a variable may be by CF (2.5.1); what is beyond is missing.
+
+    Limits of packed numbers that are whole numbers themselves are those of what is packed.
+    """
+    ends = attrs.get('valid_min', -math.inf), attrs.get('valid_max', math.inf)
+    low, high = limits = np.array(attrs.get('valid_range', ends)).astype(float)
+    kinds = [np.asarray(attrs[name]).dtype.kind for name in _VALID if name in attrs]
+    if 'scale_factor' in packed or 'add_offset' in packed:
+        scale, offset = packed.get('scale_factor', 1.0), packed.get('add_offset', 0.0)
+        if all(kind in 'iu' for kind in kinds):
+            low, high = sorted(scale * limits + offset)
+        low, high = low - 0.5 * abs(scale), high + 0.5 * abs(scale)  # as it is rounded
+    return low, high
 
 
 def _fill_land(levels: np.ndarray) -> np.ndarray:
@@ -594,7 +617,7 @@ def _part(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> Part:
         some = {**chosen, 'time': chosen['time'][time], 'depth': chosen['depth'][:levels]}
         if _bytes(layout, some) <= MAX_BYTES:
             there = axes._replace(times=axes.times[time], depths=axes.depths[:levels])
-            seen = _read(layout, some, there)
+            seen = _read(layout, some, there, wanted)
             break
     variables = [
         {
