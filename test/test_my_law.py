@@ -85,6 +85,7 @@ BROKEN = {
         'score': ('broken:NUMBER', 'ValueError: its name is taken'),
         'sweep': ('broken:NUMBER', 'ValueError: its name is taken'),
     },
+    'glider.python': {'sweep': ('broken:NUMBER', 'ValueError: its name is taken by glider_stud')},
     'glider.guidance_methods': {'los': ('broken:Law', 'ValueError: its name is taken')},
     'glider.navigation_methods': {'blind': ('broken:Blind', 'ValueError: it reads or tells gps')},
     'glider.currents': {'whirl': ('broken:Whirl', "TypeError: it needs kind: Literal['whirl']")},
@@ -402,7 +403,8 @@ def test_a_package_that_cannot_be_used_is_told_and_all_else_works(tmp_path):
     (broken.site / 'broken_failing.py').write_text('1 / 0\n')
     (broken.site / 'two_helps.py').write_text(TWO_HELPS)
     command = [sys.executable, '-m', 'two_helps']
-    program = f'import glider_control.settings, subprocess; subprocess.run({command}, check=True)'
+    program = 'import glider_bringup, glider_control.settings, subprocess; glider_bringup.sweep; '
+    program += f'subprocess.run({command}, check=True)'
     done = broken.start('-c', program)
     assert done.returncode == 0 and '<adaptive|back' in done.stdout
     told = done.stderr.splitlines()

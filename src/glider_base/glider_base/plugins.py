@@ -118,8 +118,8 @@ def offered(group: str) -> dict[str, EntryPoint]:
     found = {}
     points = entry_points(group=group)
     for point in sorted(points, key=lambda one: (not one.module.startswith('glider_'), one.value)):
-        if found.setdefault(point.name, point).value != point.value:
-            _tell(point, 'ValueError: its name is taken')
+        if (first := found.setdefault(point.name, point)).value != point.value:
+            _tell(point, f'ValueError: its name is taken by {_origin(first)}')
     return found
 
 

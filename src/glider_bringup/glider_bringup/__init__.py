@@ -7,7 +7,7 @@ is first asked for, so that ``import glider_bringup as glider`` takes no time.
 """
 
 from importlib import import_module
-from importlib.metadata import EntryPoints, entry_points
+from importlib.metadata import EntryPoint
 from typing import Any
 
 #: Public names, and the module of each.
@@ -26,16 +26,18 @@ _PUBLIC = {
 __all__ = list(_PUBLIC)
 
 
-def _added() -> EntryPoints:
-    """What packages on top bring: entry points in the group ``glider.python``."""
-    return entry_points(group='glider.python')
+def _added() -> dict[str, EntryPoint]:
+    """What packages on top bring, by name: entry points in the group ``glider.python``."""
+    from glider_base.plugins import offered
+
+    return offered('glider.python')
 
 
 def __getattr__(name: str) -> Any:
     if name in _PUBLIC:
         found = getattr(import_module(_PUBLIC[name]), name)
-    elif not name.startswith('_') and name in _added().names:
-        found = _added()[name].load()
+    elif not name.startswith('_') and name in (added := _added()):
+        found = added[name].load()
     else:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
     globals()[name] = found
@@ -43,4 +45,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*__all__, *_added().names})
+    return sorted({*__all__, *_added()})
