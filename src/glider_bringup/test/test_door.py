@@ -652,7 +652,9 @@ def test_law_of_a_program_is_flown_as_a_class_and_as_a_function(level_law, tmp_p
     assert carried.now['odom_pitch'] == two.to_xarray().odom_pitch.values[-1]
     with on_compiling(lambda: pytest.fail('a law that was flown before is compiled again')):
         glider.fly('current_8deg', changes, law=level)
-    shipped = glider.fly('current_8deg', changes)
+    with pytest.raises(TypeError, match=r'law level, .* not pickled, .* Run.score'):
+        pickle.dumps(two)
+    shipped = pickle.loads(pickle.dumps(glider.fly('current_8deg', changes)))
     assert (one.score['controller'], two.score['controller']) == ('LevelLaw', 'level')
     xarray.testing.assert_equal(one.to_xarray(), two.to_xarray())
     assert not one.to_xarray().odom_pitch.equals(shipped.to_xarray().odom_pitch)

@@ -499,9 +499,16 @@ def know_law(law: type[LawSettings]) -> str:
     known = pydantic.create_model(
         'Scenario', __base__=Scenario, control=(control, Field(control(), description='control'))
     )
-    known.control_kind = flown
+    known.control_kind, known.__reduce__ = flown, _not_pickled
     _WITH_LAW[name] = known
     return name
+
+
+def _not_pickled(scenario: Scenario) -> None:
+    raise TypeError(
+        f'a scenario with law {scenario.control.law}, of this program, is not pickled, nor is its '
+        'Run: hand on Run.score or Run.to_xarray()'
+    )
 
 
 def _kind(values: dict[str, Any]) -> type[Scenario]:
