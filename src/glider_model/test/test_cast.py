@@ -9,7 +9,7 @@ import pytest
 import xarray
 from pydantic import ValidationError
 
-from glider_model.ocean.cast import look_up
+from glider_model.ocean.cast import look_up, read_cast
 from glider_model.ocean.density import immersed
 from glider_model.ocean.water import WaterSettings
 from glider_model.vehicle.file import load_vehicle
@@ -144,6 +144,26 @@ def test_a_cast_in_netcdf(tmp_path):
     values.to_netcdf(tmp_path / 'heights.nc', engine='h5netcdf')
     found = WaterSettings.model_validate({'profile': 'heights.nc'}, context={'folder': tmp_path})
     assert found.profile == [[0.0, 1025.0], [50.0, 1026.0], [400.0, 1029.5]]
+
+
+@pytest.mark.parametrize(
+    ('name', 'unit', 'scale'),
+    [('depth', 'km', 1e-3), ('sea_water_pressure', 'bar', 0.1), ('sea_water_pressure', 'Pa', 1e4)],
+)
+def test_depths_of_a_cast_are_in_units_of_their_own(name, unit, scale, tmp_path):
+    """They were taken for m and dbar; others are refused, and what is not valid is left out."""
+    density = np.array([1025.0, 1090.0, 1029.5])
+    told = {'standard_name': 'sea_water_density', 'valid_max': 1040.0}
+    cast = {'RHO': ('N', density, told)}
+    deep = {'standard_name': name, 'units': unit}
+    cast['Z'] = ('N', scale * np.array([0.0, 50.0, 400.0]), deep)
+    xarray.Dataset(cast).to_netcdf(tmp_path / 'cast.nc', engine='scipy')
+    (_, first), (depth_m, last) = read_cast(tmp_path / 'cast.nc')
+    assert (first, last) == (1025.0, 1029.5) and depth_m == pytest.approx(400.0, rel=0.01)
+    deep['units'] = 'feet'
+    xarray.Dataset(cast).to_netcdf(tmp_path / 'feet.nc', engine='scipy')
+    with pytest.raises(ValueError, match=r"feet.nc: Z: units = 'feet' \(allowed: "):
+        read_cast(tmp_path / 'feet.nc')
 
 
 MEASURED = 'depth_m,temperature_degC,salinity_psu\n'

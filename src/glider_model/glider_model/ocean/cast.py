@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_base.errors import ConfigurationError, installed
+from glider_base.errors import ConfigurationError, installed, shown
 from glider_base.kernel import kernel
 from glider_base.signals import SEA_WATER_DENSITY
-from glider_model.ocean.columns import MAX_ROWS, check_rows, is_height, read_columns
+from glider_model.ocean.columns import MAX_ROWS, check_rows, is_height, only_valid, read_columns
 from glider_model.ocean.density import SPECIFIC_WEIGHT, displacing, immersed
 from glider_model.ocean.grid_file import engine_of
 
@@ -28,6 +28,17 @@ _STANDARD_NAMES = {
     'sea_water_temperature': 'temperature_degC',
     'sea_water_practical_salinity': 'salinity_psu',
     'sea_water_salinity': 'salinity_psu',
+}
+#: m and dbar in units that NetCDF files have, in small letters.
+_UNITS = {
+    'depth_m': {
+        **dict.fromkeys(('', 'm', 'meter', 'meters', 'metre', 'metres'), 1.0),
+        **{'cm': 0.01, 'km': 1000.0},
+    },
+    'pressure_dbar': {
+        **dict.fromkeys(('', 'dbar', 'dbars', 'db', 'decibar', 'decibars'), 1.0),
+        **{'bar': 10.0, 'kpa': 0.1, 'hpa': 0.01, 'mbar': 0.01, 'pa': 1e-4},
+    },
 }
 #: What no water is beyond.
 RANGES = dict(zip(COLUMNS[1:], ((950.0, 1100.0), (-5.0, 50.0), (0.0, 60.0)), strict=True))
@@ -160,6 +171,17 @@ def density_of(
     return gsw.rho(salinity, conservative, pressure), temperature_degC
 
 
+def _numbers(name: str, known: str, variable) -> np.ndarray:
+    """Numbers of a variable of a file, NaN where they are not valid, depth in m or dbar."""
+    attrs, units = variable.attrs, _UNITS.get(known)
+    values = only_valid(np.asarray(variable.values, dtype=float), attrs, variable.encoding)
+    unit = str(attrs.get('units', '')).strip().lower()
+    if units and unit not in units:
+        allowed = ', '.join(filter(None, units))
+        raise ConfigurationError(f'{name}: units = {shown(unit)} (allowed: {allowed})')
+    return values * units[unit] if units else values
+
+
 def _read_netcdf(path: Path, source: str) -> list[tuple[int, dict[str, float]]]:
     """Samples of a cast by depth, those that lack a number left out, those of a depth averaged."""
     import xarray
@@ -170,7 +192,7 @@ def _read_netcdf(path: Path, source: str) -> list[tuple[int, dict[str, float]]]:
             for name, variable in {**dataset.coords, **dataset.data_vars}.items():
                 known = _STANDARD_NAMES.get(variable.attrs.get('standard_name'), name)
                 if known in (*COLUMNS, 'pressure_dbar') and variable.ndim == 1:
-                    found.setdefault(known, np.asarray(variable.values, dtype=float))
+                    found.setdefault(known, _numbers(f'{source}: {name}', known, variable))
     except ConfigurationError:
         raise
     except (OSError, ValueError, TypeError, ImportError) as error:

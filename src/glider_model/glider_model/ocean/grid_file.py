@@ -20,7 +20,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError, installed
 from glider_base.files import is_file
-from glider_model.ocean.columns import is_height
+from glider_model.ocean.columns import is_height, only_valid
 
 if TYPE_CHECKING:
     import xarray
@@ -37,7 +37,6 @@ _LENGTHS = {
     **dict.fromkeys(('cm', 'centimeter', 'centimeters'), 0.01),
 }
 _AXES = ('time', 'depth', 'latitude', 'longitude')
-_VALID = ('valid_range', 'valid_min', 'valid_max')
 
 
 class Wanted(NamedTuple):
@@ -525,7 +524,7 @@ def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.nd
     """Numbers of a variable where they are chosen along its axes, in the order of these."""
     import xarray
 
-    low, high = _valid(part.attrs, part.encoding)
+    attrs, packed = part.attrs, part.encoding
     for axis, dimension in axes.items():
         pieces = [part.isel({dimension: run}) for run in _runs(chosen[axis])]
         if len(pieces) > 1:
@@ -533,23 +532,7 @@ def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.nd
         (part,) = pieces
     # read first: of packed NetCDF 3 xarray transposes nothing that it has not read
     numbers = np.asarray(part.load().transpose(*axes.values()).values, dtype=float)
-    return np.where((numbers < low) | (numbers > high), np.nan, numbers)
-
-
-def _valid(attrs: dict, packed: dict) -> tuple[float, float]:
-    """Least and most that a variable may be by CF (2.5.1); what is beyond is missing.
-
-    Limits of packed numbers that are whole numbers themselves are those of what is packed.
-    """
-    ends = attrs.get('valid_min', -math.inf), attrs.get('valid_max', math.inf)
-    low, high = limits = np.array(attrs.get('valid_range', ends)).astype(float)
-    kinds = [np.asarray(attrs[name]).dtype.kind for name in _VALID if name in attrs]
-    if 'scale_factor' in packed or 'add_offset' in packed:
-        scale, offset = packed.get('scale_factor', 1.0), packed.get('add_offset', 0.0)
-        if all(kind in 'iu' for kind in kinds):
-            low, high = sorted(scale * limits + offset)
-        low, high = low - 0.5 * abs(scale), high + 0.5 * abs(scale)  # as it is rounded
-    return low, high
+    return only_valid(numbers, attrs, packed)
 
 
 def _fill_land(levels: np.ndarray) -> np.ndarray:
