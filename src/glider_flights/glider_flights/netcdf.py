@@ -14,6 +14,7 @@ import numpy as np
 from glider_base.errors import ConfigurationError, installed
 from glider_base.files import read_yaml
 from glider_flights.record import usable
+from glider_model.ocean.columns import only_valid
 
 SUFFIXES = ('.nc', '.ncdf', '.nc4')
 #: Our unit in those of `variables.yaml`.
@@ -45,6 +46,10 @@ _USUAL = {
     'depth_m': ('m, cm', r'(m|met(er|re)s?)?'),
     'pressure': ('dbar, bar, kPa, hPa, mbar, Pa', r'(d(eci)?bars?|db)?'),
     **dict.fromkeys(('pitch_rad', 'roll_rad', 'heading_rad'), ('degrees, rad', r'(deg.*|°.*)?')),
+    **dict.fromkeys(
+        ('dac_north', 'dac_east'),
+        ('m/s, cm/s', r'((m|met(er|re)s?) *(/|per|[. ·*])? *s(ec(onds?)?)?((\^|\*\*)?-1)?)?'),
+    ),
 }
 _SINCE_1970 = re.compile(
     r'seconds\s+since\s+1970-0?1-0?1([T ]0?0:0?0(:0?0(\.0*)?)?)?\s*(Z|UTC|\+00:?00)?'
@@ -112,21 +117,22 @@ def read(path: Path, wanted: Names, spelt: Callable[[str], str] = str) -> dict[s
                 if name is None or key in found:
                     continue
                 variable = dataset[by_name[name]]
-                values = np.atleast_1d(variable.values).ravel()
-                if key not in _TEXTS:
-                    attrs = variable.attrs
-                    values = _in_ours(f'{path}: {name}', key, values, attrs, names[name])
-                found[key] = values
+                if key in _TEXTS:
+                    found[key] = np.atleast_1d(variable.values).ravel()
+                else:
+                    found[key] = _in_ours(f'{path}: {name}', key, variable, names[name])
     return found
 
 
-def _in_ours(name: str, key: str, values: np.ndarray, attrs: dict, scale: float) -> np.ndarray:
+def _in_ours(name: str, key: str, variable, scale: float) -> np.ndarray:
     """Values of a variable in our units, by its attributes; NaN for what cannot be."""
+    attrs = variable.attrs
     unit = str(attrs.get('units', ''))
     try:
-        values = values.astype(float)
+        values = np.atleast_1d(variable.values).ravel().astype(float)
     except (TypeError, ValueError) as error:
         raise ConfigurationError(f'{name} has what is no number: {error}') from None
+    values = only_valid(values, attrs, variable.encoding)
     values[np.abs(values) >= FILLS] = math.nan
     if key.endswith('time'):
         return _seconds(name, values, unit)

@@ -19,6 +19,8 @@ from glider_flights.slocum import read_slocum, slocum_files
 #: Where a glider sinks or rises by more than this (m/s), its nose further down or up than that
 #: (rad), a pitch shows its sign; of more of such samples than this it has the other one.
 RATE_MPS, PITCH_RAD, MOST_AGAINST = 0.05, math.radians(5.0), 0.9
+#: Radians that are said to be degrees are less than this (rad), however steep a glide is.
+LEVEL_RAD = math.radians(0.5 * math.pi)
 
 
 def files_by_kind(place: Path) -> dict[str, list[Path]]:
@@ -57,17 +59,25 @@ def read_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
 
 def _nose_up(place: Path, flight: Flight) -> Flight:
     """The flight, whose nose is up where it rises; raises ConfigurationError."""
-    shown = against = 0
+    moved = shown = against = 0
+    steepest = 0.0
     for samples in (segment.samples for segment in flight.segments):
         rate, pitch = vertical_rate(samples.time_s, samples.depth_m), samples.pitch_rad
-        shows = (np.abs(rate) > RATE_MPS) & (np.abs(pitch) > PITCH_RAD)
-        shows &= samples.depth_m > DIVE_DEPTH_M
+        moves = (np.abs(rate) > RATE_MPS) & (samples.depth_m > DIVE_DEPTH_M)
+        moved += moves.sum()
+        steepest = np.max(np.abs(pitch[moves]), initial=steepest)
+        shows = moves & (np.abs(pitch) > PITCH_RAD)
         shown += shows.sum()
         against += (shows & (rate * pitch > 0.0)).sum()
     if against > MOST_AGAINST * shown:
         raise ConfigurationError(
             f'{place}: the pitch is nose up while it sinks, or down while it rises, in '
             f'{against / shown:.0%} of its samples (allowed: + nose up)'
+        )
+    if flight.kind == 'og1' and moved and steepest < LEVEL_RAD:
+        raise ConfigurationError(
+            f'{place}: the pitch is {math.degrees(steepest):.2f} degrees at most where it sinks '
+            'and rises (allowed: degrees, or units = rad)'
         )
     return flight
 

@@ -617,6 +617,12 @@ def with_fixes_that_are_none(data):
     return data.assign({name: data[name].where(~lost, 0.0) for name in names})
 
 
+def with_what_is_not_valid(data):
+    """By what the file says of it."""
+    pitch = data.PITCH.where(np.arange(data.sizes['N_MEASUREMENTS']) % 5 > 0, 85.0)
+    return data.assign(PITCH=pitch.assign_attrs(units='degrees', valid_max=60.0))
+
+
 def with_fills(data):
     """Some have no number, and the file does not say which stands for none."""
     names, dived = ('DEPTH', 'PITCH', 'HEADING'), data.DEPTH > 50.0
@@ -629,6 +635,7 @@ def with_fills(data):
     'change',
     [
         with_fills,
+        with_what_is_not_valid,
         lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0),
         across_the_date_line,
         lambda data: data.assign(DEPTH=(-data.DEPTH).assign_attrs(units='m', positive='up')),
@@ -648,7 +655,10 @@ def test_a_flight_in_og1_is_the_same_however_it_is_told(change, tmp_path):
         assert row.dac_mps == pytest.approx(CURRENT, abs=0.005)
 
 
-@pytest.mark.parametrize(('name', 'unit'), [('DEPTH', 'km'), ('DEPTH', 'dm'), ('PITCH', 'gon')])
+@pytest.mark.parametrize(
+    ('name', 'unit'),
+    [('DEPTH', 'km'), ('DEPTH', 'dm'), ('PITCH', 'gon'), ('DAVG_CURR_EAST', 'knots')],
+)
 def test_a_unit_that_is_not_known_is_refused_by_name(name, unit, tmp_path):
     data = og1(2)
     data[name].attrs['units'] = unit
@@ -663,6 +673,17 @@ def test_a_pitch_of_the_other_sign_is_refused(tmp_path):
     for read in (read_flight, read_whole):
         with pytest.raises(ConfigurationError, match=r'in 100% of its samples \(allowed: \+ nose'):
             read(tmp_path, None, quiet)
+
+
+def test_a_pitch_in_radians_that_says_degrees_is_refused(tmp_path):
+    data = og1(2)
+    pitch = np.radians(data.PITCH).assign_attrs(units='degrees')
+    data.assign(PITCH=pitch).to_netcdf(tmp_path / 'unit_1.nc', engine='scipy')
+    assert re.search(r'the pitch is 0\.\d\d degrees at most where it sinks', told(str(tmp_path)))
+    data.assign(PITCH=pitch.assign_attrs(units='rad')).to_netcdf(
+        tmp_path / 'unit_1.nc', engine='scipy'
+    )
+    assert len(navigated(read_flight(tmp_path, None, quiet))) == 2
 
 
 def test_a_depth_of_the_other_sign_is_refused(tmp_path):
