@@ -132,14 +132,24 @@ def usable(what: str, make: Callable, *of: Any) -> Any:
         raise
     except (Exception, SystemExit) as error:  # it may not be our code
         raise ConfigurationError(f'{what}: {said_by(error)}') from error
-    try:
-        typeof(values)
-    except ValueError:
+    if odd := _odd(what, values):
         raise ConfigurationError(
-            f'{what}: {shown(values)}: not usable (allowed: a NamedTuple of numbers, arrays and '
-            'such NamedTuples)'
-        ) from None
+            f'{odd}: not usable (allowed: a NamedTuple of numbers, arrays and such NamedTuples)'
+        )
     return values
+
+
+def _odd(name: str, value: Any) -> str:
+    """Name and value of the first part that compiled code cannot take, or not safely: a list."""
+    if isinstance(value, tuple):
+        fields = getattr(value, '_fields', range(len(value)))
+        odd = (_odd(f'{name}.{field}', part) for field, part in zip(fields, value, strict=True))
+        return next(filter(None, odd), '')
+    try:
+        typeof(value)
+    except ValueError:
+        return f'{name}: {shown(value)}'
+    return f'{name}: {shown(value)}' if isinstance(value, list) else ''
 
 
 def checked(kernel: Callable, *what: str) -> Callable:

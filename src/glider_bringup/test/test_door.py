@@ -756,6 +756,11 @@ def test_a_cell_that_is_run_anew_flies_what_stands_in_it_now(level_law):
             ["control.law: initial_state: {'count': 0}: not usable", 'NamedTuple of numbers'],
         ),
         (
+            run_cell(CELL.replace('Level(self.k)', 'Level([1, self.k])')),
+            {},
+            ['control.law: params.k: [1, 25.0]: not usable', 'NamedTuple of numbers'],
+        ),
+        (
             run_cell(CELL.replace('Level(self.k)', 'Level(vehicle.keel.value)')),
             {},
             ['control.law: params: <ipython-input-1>, line ', ': AttributeError: ', 'keel'],
