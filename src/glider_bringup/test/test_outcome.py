@@ -159,6 +159,12 @@ def test_a_mission_that_ceased_to_dive_is_unfinished(fields, status):
         ({'dives': 0}, [{'hold': True}], ''),
         ({'dives': 1}, [{'hold': True}], ''),
         ({'dives': 3}, [{'hold': True}, {'resume': True, 'at_s': 3000.0}], ''),
+        ({'dives': 2}, [{'hold': True}, {'resume': True, 'at_s': 1600.0}], ''),
+        (
+            {'dives': 2, 'sensors.depth_offset_m': 1.5},
+            [{'hold': True}, {'resume': True, 'at_s': 1600.0}],
+            'dives flown',
+        ),
     ],
 )
 def test_a_mission_that_is_held_before_it_has_flown_is_unfinished(fields, orders, says):
@@ -208,6 +214,15 @@ def test_a_mission_that_drifts_before_the_end_of_its_path_is_unfinished(dives, a
     changes = {**yo, 'dives': dives, 'sensors.depth_offset_m': 1.5, 'orders': orders}
     _, told = fly_scored(load_scenario('current_8deg', changes), [])
     assert (told['status'], told['dives']) == ('unfinished', 1)
+    assert told['reason'].startswith('afloat')
+
+
+def test_who_lies_afloat_on_a_path_in_depth_is_unfinished():
+    """It follows its path up to the surface, and cannot follow it along there."""
+    points = [[0, 0, 20], [150, 0, 100], [300, 0, 0], [1500, 0, 0], [1700, 0, 100]]
+    start = {'path': {'kind': 'waypoints', 'waypoints': points}, 'initial.east_m': 0.0}
+    _, told = fly_scored(load_scenario('helix', {**start, 'duration_s': 9000.0}), [])
+    assert (told['status'], told['arrival']['arrived']) == ('unfinished', False)
     assert told['reason'].startswith('afloat')
 
 

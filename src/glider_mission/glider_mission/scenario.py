@@ -406,8 +406,6 @@ class Scenario(Settings):
 
     def _dive_s(self) -> float:
         """Time (s) that is ample for a stay and a dive; infinite where it may wait for good."""
-        if self._held_s() and (self.dives or math.isinf(self._held_s())):
-            return math.inf
         slowest_s = max(self._glide_s(settings) for settings in self._in_turn())
         return AMPLE * 2.0 * slowest_s + self._stay_s() + self._held_s()
 

@@ -379,7 +379,7 @@ class Scorer:
         is_led_aground = self._bottom and self._bottom.touched_tick is not None
         if rules.dives_at_all and not dives and (is_led_aground or not _dives_at_all(depth)):
             return 'no dive flown, for which there was time'
-        if rules.dives_at_all and not ended and _idles(depth, rules):
+        if rules.dives_at_all and not ended and not is_done and _idles(depth, rules):
             return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
         since, way_m = task
         ample_s = rules.spare_s + rules.pace_s * way_m
