@@ -234,6 +234,18 @@ SURVEY = load_scenario('survey').path.model_dump(mode='json')
             },
             'not at the end of its path',
         ),
+        # too light to dive: neither its one dive nor its path in depth
+        (
+            'helix',
+            {
+                'perturb.net_heaviness_kg': -1.0,
+                'path': {'kind': 'waypoints', 'waypoints': [[0, 0, 20], [350, 0, 150]]},
+                'initial.depth_m': 0.1,
+                'dives': 1,
+                'duration_s': 8000.0,
+            },
+            'not at the end of its path',
+        ),
     ],
 )
 def test_what_there_was_time_for_goes_by_the_way_and_the_orders(name, changes, missing):

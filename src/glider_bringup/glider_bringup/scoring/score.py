@@ -383,7 +383,7 @@ class Scorer:
             return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
         since, way_m = task
         ample_s = rules.spare_s + rules.pace_s * way_m
-        if arrival and not ended and not rules.dives and time_s - seconds(since) >= ample_s:
+        if arrival and not ended and not is_done and time_s - seconds(since) >= ample_s:
             off = f'{arrival["missed_m"]:,.0f} m from its last point'
             return f'not at the end of its path, for which there was time in still water: {off}'
         return ''
