@@ -150,6 +150,10 @@ def test_a_mission_that_ceased_to_dive_is_unfinished(fields, status):
     assert told['reason'].startswith('no dive flown' if status == 'unfinished' else '')
 
 
+#: It is at the end of its path before it has flown its dives.
+SHORT = {'dives': 4, 'path.length_m': 400.0, 'path.at_end': 'stop'}
+
+
 @pytest.mark.parametrize(
     ('fields', 'orders', 'says'),
     [
@@ -160,6 +164,8 @@ def test_a_mission_that_ceased_to_dive_is_unfinished(fields, status):
         ({'dives': 1}, [{'hold': True}], ''),
         ({'dives': 3}, [{'hold': True}, {'resume': True, 'at_s': 3000.0}], ''),
         ({'dives': 2}, [{'hold': True}, {'resume': True, 'at_s': 1600.0}], ''),
+        (SHORT, [{'hold': True, 'at_s': 300.0}, {'resume': True, 'at_s': 900.0}], ''),
+        (SHORT, [{'hold': True, 'at_s': 3000.0}], ''),
         (
             {'dives': 2, 'sensors.depth_offset_m': 1.5},
             [{'hold': True}, {'resume': True, 'at_s': 1600.0}],

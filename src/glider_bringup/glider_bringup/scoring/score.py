@@ -371,10 +371,11 @@ class Scorer:
                 return f'over before another path was ordered, at {min(later_s):,.0f} s'
             return ''
         stays = [order for order in self._followed if order.hold or order.resume]
-        goes_on = dives < max(1, rules.dives) or (arrival and not ended and not is_done)
-        if stays and stays[-1].hold and goes_on:
+        goes_on = dives < max(1, rules.dives) or (arrival and not is_done)
+        if stays and stays[-1].hold and goes_on and not ended:
             return f'held at the surface as ordered at {stays[-1].at_s:,.0f} s, and not resumed'
-        if dives < (in_time := min(rules.dives, int(rules.duration_s / rules.dive_s))):
+        in_time = min(rules.dives, int(rules.duration_s / rules.dive_s))
+        if dives < in_time and not ended:
             return f'dives flown, of those that there was time for: {dives} of {in_time}'
         is_led_aground = self._bottom and self._bottom.touched_tick is not None
         if rules.dives_at_all and not dives and (is_led_aground or not _dives_at_all(depth)):
