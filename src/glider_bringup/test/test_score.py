@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
+import glider_bringup
 from glider_base.signals import TICK_S
+from glider_bringup.scoring.again import score_again
 from glider_bringup.scoring.score import Scorer
 from glider_guidance.path.settings import HelixPath, WaypointPath
 from glider_guidance.yo.stage import AT_END_OF_PATH
@@ -470,3 +472,16 @@ def test_scorer_keeps_nothing_of_a_block_by_reference():
     before = scorer.result(Rules())
     log[:] = 9.0
     assert scorer.result(Rules()) == before
+
+
+def test_a_fix_that_navigation_does_not_read_is_not_scored(tmp_path):
+    """Nor a current that it does not tell: the score is that from the bag, or over nodes."""
+    changes = {'sensors.also_fitted': ['fix'], 'sensors.gps_first_fix_s': 5.0}
+    changes |= {'profile.depth_m': 15.0, 'profile.surface_every_dives': 1, 'profile.wait_s': 60.0}
+    changes |= {'profile.prepare_s': 0.0, 'current.speed_kn': 0.1}
+    run = glider_bringup.fly('current_8deg', changes, duration=700, out=tmp_path / 'run', bag=True)
+    fixed = np.isfinite(run.to_xarray()['fix_latitude'].to_numpy())
+    told = run.score['navigation']
+    assert told['surfacings'] >= 2 and np.count_nonzero(np.diff(fixed.astype(int)) == 1) >= 2
+    assert (told['fixed'], told['dac_error_mps']['rms']) == (0, None)
+    assert score_again(tmp_path / 'run') == run.score

@@ -74,7 +74,7 @@ class NavigationScorer:
         start = 0
         while start < len(log):
             end, self._way = _until_turn(log, true, start, self._is_deep, self._way)
-            if self._waits_for_fix:
+            if self._reckons and self._waits_for_fix:
                 self._look_for_fix(log[start:end])
             if end < len(log):
                 self._turn(log[end], true[end], self._ticks + end)
