@@ -92,6 +92,12 @@ def test_guard_waits_for_no_pressure_where_the_vehicle_publishes_odom(glider, wo
     assert told['pressure'] == waits
 
 
+def test_a_route_that_is_planned_in_flight_is_refused(glider):
+    said = glider('autopilot', 'survey', '--set', 'guidance.route=planned', '--print-parameters')
+    assert (said.returncode, said.stdout) == (2, '')
+    assert "guidance.route = 'planned': not over nodes" in said.stderr
+
+
 def test_recording_verifies(glider, flights):
     done = glider('verify', flights['together'][0])
     assert done.returncode == 0, done.stdout + done.stderr

@@ -233,6 +233,7 @@ def test_recording_adds_the_recorder_and_makes_a_run_folder(tmp_path):
     [
         ({'scenario': 'nonsense'}, ['nonsense', 'current_8deg']),
         ({'scenario': 'no/such.yaml'}, ['no/such.yaml']),
+        ({'scenario': 'eddies_hard'}, ["guidance.route = 'planned': not over nodes"]),
         ({'controller': 'bang'}, ['controller:=bang', 'adaptive, backstepping, pid']),
         ({'lockstep': 'maybe'}, ['lockstep:=maybe', 'true, false']),
         ({'speed': 'fast'}, ['speed:=fast', '0.01 to 1e+06, or max']),

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from glider_base.settings import ConfigurationError
 from glider_base.signals import SEA_WATER_DENSITY, TICK_S
 from glider_guidance.guidance import path_time_s
 from glider_guidance.yo.machine import mission_time_s
@@ -53,3 +54,13 @@ def unballasted(scenario: Scenario) -> list[str]:
                 f'does: by {off_kg:.2g} kg; ballast it in its vehicle file (volume, rigid_body)'
             ]
     return []
+
+
+def refuse_planned_route(scenario: Scenario) -> None:
+    """Refuse a scenario whose route is planned in flight."""
+    if scenario.guidance.route == 'planned':
+        raise ConfigurationError(
+            "guidance.route = 'planned': not over nodes, step by step, or with a bag (fly it with "
+            '--engine direct: the scenario of its run folder has the route as orders, and flies '
+            'so by either engine)'
+        )

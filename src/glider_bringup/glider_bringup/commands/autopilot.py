@@ -13,6 +13,7 @@ from glider_base.ros.places import NAMESPACE_ALLOWED, absolute_namespace
 from glider_base.settings import ConfigurationError
 from glider_bringup.console import Changes, Law, Named, changed_fields, messages
 from glider_mission.choices import chosen_fields
+from glider_mission.planned import refuse_planned_route
 from glider_mission.scenario import load_scenario
 
 app = typer.Typer()
@@ -67,6 +68,7 @@ def autopilot(
         if '__node:=' in word or '__name:=' in word:  # they would have no parameters
             raise ConfigurationError(f'{word}: not here (allowed: the nodes by their names)')
     flown = load_scenario(scenario, chosen_fields(changed_fields(changes), controller))
+    refuse_planned_route(flown)
     reckons = 'measured_odom' not in flown.navigation.topics if navigation is None else navigation
     parts = [name for name in PARTS if name != 'navigation' or reckons]
     nodes = [f'{name}_node' for name in parts]

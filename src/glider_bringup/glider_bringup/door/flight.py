@@ -17,7 +17,7 @@ from glider_bringup.console import compiling
 from glider_bringup.door.run import chosen_scenario
 from glider_bringup.engines.compiling import shown_once
 from glider_bringup.engines.direct import FlightError, fault_of, finite_rows
-from glider_bringup.engines.flight import Held, Kept, refuse_message_faults, refuse_planned_route
+from glider_bringup.engines.flight import Held, Kept, refuse_message_faults
 from glider_bringup.scoring.scores import seconds
 from glider_control.law import LawSettings
 from glider_guard.rows import LATCHED
@@ -27,6 +27,7 @@ from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.chart import in_metres
 from glider_mission.choices import combination_of
+from glider_mission.planned import refuse_planned_route
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario
 
 #: A vehicle that has been below the first depth and is above the second has surfaced (m).

@@ -287,16 +287,6 @@ def refuse_message_faults(scenario: Scenario) -> None:
         )
 
 
-def refuse_planned_route(scenario: Scenario) -> None:
-    """Refuse a scenario whose route is planned in flight."""
-    if scenario.guidance.route == 'planned':
-        raise ConfigurationError(
-            "guidance.route = 'planned': not over nodes, step by step, or with a bag (fly it with "
-            '--engine direct: the scenario of its run folder has the route as orders, and flies '
-            'so by either engine)'
-        )
-
-
 def fly(
     scenario: Scenario,
     sinks: Iterable[Sink] = (),

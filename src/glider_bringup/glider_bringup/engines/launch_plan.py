@@ -29,6 +29,7 @@ from glider_bringup.engines.processes import (
 from glider_control.settings import LAWS
 from glider_guidance.settings import METHODS, OLD_NAMES
 from glider_mission.choices import chosen_fields, number
+from glider_mission.planned import refuse_planned_route
 from glider_mission.run_folder import PARAMETERS_FILE, SCENARIO_FILE, VEHICLE_FILE, make_run_folder
 from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, load_scenario, scenario_names
 
@@ -178,6 +179,7 @@ def plan_launch(arguments: dict[str, str], log_folder: Path) -> LaunchPlan:
     if namespace is None:
         _refuse('namespace', text, NAMESPACE_ALLOWED)
     scenario = load_scenario(text['scenario'], _changes(text))
+    refuse_planned_route(scenario)
     record_to = None
     if text['record']:
         record_to = make_run_folder(scenario, Path(text['record']).expanduser())

@@ -16,11 +16,11 @@ from glider_bringup.engines.flight import (
     ended,
     fly,
     refuse_message_faults,
-    refuse_planned_route,
 )
 from glider_bringup.engines.node_parameters import node_parameters, write_parameters
 from glider_bringup.engines.processes import Layout, node_commands, run_nodes
 from glider_mission.disk import DiskError, vanished
+from glider_mission.planned import refuse_planned_route
 from glider_mission.recording.bag_files import has_bag
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.ros.log_writer import LogWriter
