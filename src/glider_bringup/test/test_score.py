@@ -21,6 +21,7 @@ from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.rules import Rules
 from glider_mission.scenario import load_scenario
+from glider_navigation.settings import METHODS
 
 quick = settings(max_examples=20)
 
@@ -484,4 +485,16 @@ def test_a_fix_that_navigation_does_not_read_is_not_scored(tmp_path):
     told = run.score['navigation']
     assert told['surfacings'] >= 2 and np.count_nonzero(np.diff(fixed.astype(int)) == 1) >= 2
     assert (told['fixed'], told['dac_error_mps']['rms']) == (0, None)
+    assert score_again(tmp_path / 'run') == run.score
+
+
+def test_a_current_that_a_method_does_not_tell_is_not_scored(tmp_path, monkeypatch):
+    """As of a method of one's own that keeps what it estimates to itself."""
+    monkeypatch.setattr(METHODS['dead_reckoned'], 'tells', ())
+    changes = {'profile.depth_m': 15.0, 'profile.surface_every_dives': 1, 'profile.wait_s': 60.0}
+    changes |= {'profile.prepare_s': 0.0, 'current.speed_kn': 0.1, 'sensors.gps_first_fix_s': 5.0}
+    changes |= {'navigation.method': 'dead_reckoned'}
+    run = glider_bringup.fly('current_8deg', changes, duration=700, out=tmp_path / 'run', bag=True)
+    told = run.score['navigation']
+    assert told['fixed'] >= 2 and told['dac_error_mps']['rms'] is None
     assert score_again(tmp_path / 'run') == run.score

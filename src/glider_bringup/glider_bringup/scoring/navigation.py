@@ -55,11 +55,11 @@ class NavigationScorer:
     """Takes in log rows, and tells of every surfacing.
 
     Fixes are relative to ``origin``; ``reckons``: the vehicle has to reckon its place between
-    them.
+    them; ``tells``: it tells the current that it estimates.
     """
 
-    def __init__(self, origin: Origin, reckons: bool = False) -> None:
-        self._origin, self._reckons = origin, reckons
+    def __init__(self, origin: Origin, reckons: bool, tells: bool) -> None:
+        self._origin, self._reckons, self._tells = origin, reckons, tells
         self._ticks, self._is_deep = 0, False
         self._way = _Way()
         self._dive_tick, self._waits_for_fix, self._was_fixed = 0, False, False
@@ -90,7 +90,8 @@ class NavigationScorer:
             self._way, self._waits_for_fix = _Way(), False
             return
         estimated = row[_BELIEVED : _BELIEVED + 2]
-        if self._was_fixed and np.all(np.isfinite(estimated)):  # by the dive segment before
+        if self._was_fixed and self._tells and np.all(np.isfinite(estimated)):
+            # by the dive segment before
             self._surfacings[-1]['dac_believed_mps'] = _north_east(estimated)
             self._dac_errors.append(math.dist(estimated, self._mean_current))
         ticks = max(1, self._way.ticks)

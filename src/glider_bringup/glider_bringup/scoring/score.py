@@ -136,7 +136,8 @@ class Scorer:
         self._waypoints = getattr(scenario.path, 'waypoints', [])[1:-1]
         self._nearest_m = np.full(len(self._waypoints), math.inf)
         self._truth = TrueMotion()
-        self._navigation = NavigationScorer(scenario.origin.params(), reckons)
+        tells = 'believed_current' in scenario.topics
+        self._navigation = NavigationScorer(scenario.origin.params(), reckons, tells)
         self._faults = FaultTimes(scenario.faults)
         self._energy = EnergyScorer(vehicle.energy)
         self._blocks: list[np.ndarray] = []
