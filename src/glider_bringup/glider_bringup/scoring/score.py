@@ -247,6 +247,9 @@ class Scorer:
         arrival = self._arrival(rules)
         missing = self._missing(depth, dives, arrival['arrival'], task, rules)
         status, reason = outcome_of(depth, reported, self._hull, infeasible, missing)
+        lacks_dives = dives < rules.dives and self._end is None
+        if status == COMPLETED and lacks_dives and rules.duration_s - time_s <= TICK_S:
+            reason = reason or f'its time was over after {dives} of {rules.dives} dives'
         if status in (COMPLETED, INFEASIBLE) and self._waiting:
             times = ', '.join(f'{order.at_s:,.0f} s' for order in self._waiting)
             left = f'it never came to what it was ordered at {times}'
