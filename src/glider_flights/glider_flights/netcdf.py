@@ -54,6 +54,8 @@ _USUAL = {
 _SINCE_1970 = re.compile(
     r'seconds\s+since\s+1970-0?1-0?1([T ]0?0:0?0(:0?0(\.0*)?)?)?\s*(Z|UTC|\+00:?00)?'
 )
+#: Flags of quality, in a variable of the same name with this ending, of what is bad, or missing.
+_QUALITY, _BAD = '_QC', (4.0, 9.0)
 #: By our name, what each name in a file is multiplied by, best name first.
 Names = dict[str, dict[str, float]]
 
@@ -105,8 +107,8 @@ def read(path: Path, wanted: Names, spelt: Callable[[str], str] = str) -> dict[s
     """Variables of a file as flat arrays in our units, by our names.
 
     Times, in s since 1970, are those of which ours ends with ``time``. ``spelt`` makes a wanted
-    name of one in the file. Raises ConfigurationError, also for a depth, pressure or angle in a
-    unit that is not known.
+    name of one in the file. What a file flags as bad is NaN. Raises ConfigurationError, also for a
+    depth, pressure or angle in a unit that is not known.
     """
     found: dict[str, np.ndarray] = {}
     with opened(path) as groups:
@@ -119,8 +121,11 @@ def read(path: Path, wanted: Names, spelt: Callable[[str], str] = str) -> dict[s
                 variable = dataset[by_name[name]]
                 if key in _TEXTS:
                     found[key] = np.atleast_1d(variable.values).ravel()
-                else:
-                    found[key] = _in_ours(f'{path}: {name}', key, variable, names[name])
+                    continue
+                found[key] = values = _in_ours(f'{path}: {name}', key, variable, names[name])
+                flags = dataset.get(f'{by_name[name]}{_QUALITY}')
+                if flags is not None and flags.size == values.size:
+                    values[np.isin(flags.values.ravel().astype(float), _BAD)] = math.nan
     return found
 
 

@@ -623,6 +623,16 @@ def with_what_is_not_valid(data):
     return data.assign(PITCH=pitch.assign_attrs(units='degrees', valid_max=60.0))
 
 
+def with_flags(data):
+    """Some numbers are bad, and flagged so."""
+    bad = {name: np.arange(data.sizes[data[name].dims[0]]) % 7 == 3 for name in ('DEPTH', 'PITCH')}
+    flagged = {}
+    for name, where in bad.items():
+        flagged[name] = data[name].where(~where, 1.5 * data[name]).assign_attrs(data[name].attrs)
+        flagged[f'{name}_QC'] = (data[name].dims, np.where(where, 4, 1).astype('int8'))
+    return data.assign(flagged)
+
+
 def with_fills(data):
     """Some have no number, and the file does not say which stands for none."""
     names, dived = ('DEPTH', 'PITCH', 'HEADING'), data.DEPTH > 50.0
@@ -635,6 +645,7 @@ def with_fills(data):
     'change',
     [
         with_fills,
+        with_flags,
         with_what_is_not_valid,
         lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0),
         across_the_date_line,
