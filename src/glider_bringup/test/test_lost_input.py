@@ -242,6 +242,31 @@ def test_what_comes_with_a_stamp_that_stands_still_is_told_from_what_does_not_co
     assert 'stands still' not in flight.guard.condition().message
 
 
+@pytest.mark.parametrize(
+    ('name', 'stamp_s', 'old_s', 'told'),
+    [
+        ('health', 0, 10.0, True),
+        ('battery', 7, 600.0, True),
+        ('altitude', 0, 5.0, True),
+        ('altitude', 7, 5.0, False),  # its last echo again
+    ],
+)
+def test_what_counts_no_more_for_its_stamp_stands_still_is_told(
+    by_hand, name, stamp_s, old_s, told
+):
+    """A driver that leaves the stamp empty."""
+    flight = by_hand(altitude=True)
+    item = next(item for item in flight.guard.inputs if item.topic.name == name)
+    raw = item.topic.codec.encode(stamp_s * 10**9, at_rest(name))
+    for after_s in (0.0, old_s - 1.0, 2.0):
+        assert not flight.said
+        flight.now_s += after_s
+        flight.guard._on_newest(item, raw, {})
+    assert flight.said == told * [
+        f'message refused: {name}: its stamp stands still at {stamp_s} s'
+    ]
+
+
 def test_control_that_is_configured_again_counts_anew_what_it_refuses(context):
     node, told = ControlNode(context=context), []
     try:

@@ -38,7 +38,7 @@ from glider_base.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, Topic, topic_of
 from glider_base.settings import Settings, number
 from glider_base.signals import TICK_NS, not_finite, raised
-from glider_base.wiring import WHEN_SILENT
+from glider_base.wiring import CONDITION, WHEN_SILENT
 
 #: A node looks for its peers this often (s), and after a while in so small a share of its wait.
 _STARTUP_PERIOD_S, _STARTUP_SHARE = 0.03, 0.02
@@ -484,6 +484,11 @@ class TickNode(Node):
             return
         try:
             item.accept_newest(raw, self.now_s(), self.ticks.input_max_age_s)
+            name = item.topic.name
+            may_repeat = name not in CONDITION and item.stamp_ns > 0  # its last fix, or echo
+            is_old = item.stood_s - item.arrived_s > self.max_age_s(name)
+            if name in WHEN_SILENT and is_old and not may_repeat:
+                raise MessageError(f'{name}: its stamp stands still at {item.stamp_ns / 1e9:g} s')
         except NotFiniteFieldError as error:
             if item.topic.name in ('fix', 'altitude'):  # without a fix or an echo
                 item.values = WHEN_SILENT[item.topic.name]
