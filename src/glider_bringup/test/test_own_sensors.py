@@ -248,6 +248,23 @@ def test_who_waits_for_a_clock_that_nobody_publishes_says_so_once(context, monke
         flight.close()
 
 
+def test_a_clock_that_runs_backwards_is_told(context, monkeypatch):
+    monkeypatch.setattr(step_node, '_STANDS_S', 1.0)
+    flight, left_s = Flight(context, use_sim_time=True), iter(range(10**6, 0, -1))
+    try:
+        clock = flight.vehicle.node.create_publisher(Clock, '/clock', 1)
+
+        def is_told() -> bool:
+            clock.publish(Clock(clock=Time(sec=next(left_s))))
+            return flight.vehicle.said('use_sim_time, and no /clock that goes on')
+
+        flight.until(lambda: flight.navigation.now_s() > 0.0 or is_told())
+        flight.vehicle.told.clear()
+        flight.until(is_told)
+    finally:
+        flight.close()
+
+
 def test_a_negative_time_is_refused_and_ends_no_node(context):
     """As of a vehicle that counts down to its release."""
     flight = Flight(context, use_sim_time=True)

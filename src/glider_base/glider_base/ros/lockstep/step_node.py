@@ -16,7 +16,7 @@ from glider_base.wiring import SAMPLED, SLOW_S, WHEN_SILENT
 #: Samples of attitude and pressure are old after so many periods: two in a row may be missed.
 OLD_AFTER = 3.0
 _COUNTED = ('lost', 'late')
-#: With use_sim_time: nobody acts, and says so, when the time has stood still for so long (s).
+#: With use_sim_time: nobody acts, and says so, when the time has not gone on for so long (s).
 _STANDS_S = 5.0
 _TELL_EVERY_S = 10.0
 #: So far (in ticks) the steps may be ahead of the stamps before one is left out.
@@ -66,7 +66,7 @@ class StepNode(TickNode):
         self._cycle_s: float | None = None
         StepNode.forget(self)  # its own alone: a subclass has made nothing yet
         self._rivals: list[str] = []
-        self._stood = (0.0, time.monotonic())  #: time of the cycles, and since when it is that (s)
+        self._stood = (0.0, time.monotonic())  #: time of the cycles, and when it went on last (s)
         self._reported = (0, 0, 0)
         self._tell_s = -float('inf')
 
@@ -95,13 +95,14 @@ class StepNode(TickNode):
         if rivals and rivals != self._rivals:
             self.event(self._newest_ns(), health.ERROR, '; '.join(rivals))
         self._rivals = rivals
-        now_s = self.now_s()
-        if now_s != self._stood[0]:
-            self._stood = now_s, time.monotonic()
-        elif not self.ticks.lockstep and time.monotonic() - self._stood[1] > _STANDS_S:
-            said = 'use_sim_time, and no /clock: nothing is done until it comes'
+        (before_s, since_s), now_s = self._stood, self.now_s()
+        if now_s > before_s:
+            since_s = time.monotonic()
+        elif not self.ticks.lockstep and time.monotonic() - since_s > _STANDS_S:
+            said = 'use_sim_time, and no /clock that goes on: nothing is done until it does'
             self.event(self._newest_ns(), health.ERROR, said)
-            self._stood = now_s, math.inf  # once
+            since_s = math.inf  # once
+        self._stood = now_s, since_s
 
     def heard_rivals(self) -> list[str]:
         """Who else says what nobody tells apart, in words: that is the time of /clock."""
