@@ -60,6 +60,13 @@ def test_steps_of_one_have_the_same_bits(at_once):
     assert flight.t_s == END_S and not flight.is_over
 
 
+def test_ticks_and_times_may_be_small_numbers_of_numpy():
+    flight = glider.Flight('current_8deg')
+    flight.step(np.int16(600))
+    assert flight.step(np.int8(100)).tick == 700
+    assert flight.until(t_s=np.float16(75.0)).tick == 750
+
+
 def test_it_is_what_fly_flies(at_once):
     name, whole = at_once
     run = glider.fly(name, WATERS[name], seed=3, duration=END_S).to_xarray().isel(time=-1)

@@ -186,7 +186,7 @@ class Flight:
         """Fly ``n`` ticks of 0.1 s, or until the mission ends; raises as `until`."""
         if not isinstance(n, Integral) or n < 1:
             raise ConfigurationError(f'n = {shown(n)}: not usable (allowed: ticks, 1 and more)')
-        return self._fly(self.tick + n, 'end')
+        return self._fly(self.tick + int(n), 'end')
 
     def until(self, event: str = 'end', *, t_s: float = math.inf) -> Event:
         """Fly until something happens, a time since the start (s) has come, or the mission ends.
@@ -215,7 +215,7 @@ class Flight:
             raise ConfigurationError(f'event = {shown(event)}: unknown (allowed: {allowed})')
         if not isinstance(t_s, Real) or not t_s > -math.inf:
             raise ConfigurationError(f't_s = {shown(t_s)}: not usable (allowed: seconds, or inf)')
-        return self._fly(round(min(t_s, 1e9) / TICK_S), event)  # no flight is so long
+        return self._fly(round(min(float(t_s), 1e9) / TICK_S), event)  # no flight is so long
 
     def order(self, **asked: Any) -> Order:
         """Tell the vehicle something, from the next tick on.
