@@ -6,6 +6,7 @@ import copy
 import math
 import pickle
 import re
+import signal
 import subprocess
 import sys
 from contextlib import nullcontext
@@ -22,7 +23,7 @@ from glider_base.ros.lockstep import block_node
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import Stop
 from glider_base.signals import TICK_NS, TICK_S
-from glider_bringup.engines.direct import FlightError
+from glider_bringup.engines.direct import FlightError, HeldMission
 from glider_bringup.engines.flight import ended
 from glider_control.law import LawSettings, law_step
 from glider_guard.rows import LATCHED
@@ -117,6 +118,21 @@ def test_two_fly_side_by_side_and_do_not_touch_each_other(at_once):
         one.step(100)
         other.step(100)
     assert numbers(one) == numbers(whole)
+
+
+def test_ctrl_c_leaves_it_between_two_ticks(monkeypatch):
+    one, other = (glider.Flight('current_8deg', seed=3) for _ in range(2))
+    fly = HeldMission.fly
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            HeldMission, 'fly', lambda *held: (fly(*held), signal.raise_signal(signal.SIGINT))[0]
+        )
+        with pytest.raises(KeyboardInterrupt):
+            one.until('surfacing', t_s=300.0)
+    assert one.tick == other.step(600).tick
+    one.step(100)
+    other.step(100)
+    assert numbers(one) == numbers(other)
 
 
 def test_it_is_flown_until_something_happens():

@@ -3,6 +3,7 @@
 """A flight that anybody can hold: flown step by step, looked at, kept, and flown on."""
 
 import math
+import signal
 from collections.abc import Callable, Mapping
 from numbers import Integral, Real
 from pathlib import Path
@@ -18,6 +19,7 @@ from glider_bringup.door.run import chosen_scenario
 from glider_bringup.engines.compiling import shown_once
 from glider_bringup.engines.direct import FlightError, fault_of, finite_rows
 from glider_bringup.engines.flight import Held, Kept, refuse_message_faults
+from glider_bringup.engines.interrupts import interrupts_noted
 from glider_bringup.scoring.scores import seconds
 from glider_control.law import LawSettings
 from glider_guard.rows import LATCHED
@@ -276,15 +278,25 @@ class Flight:
     def _fly(self, last_tick: float, event: str) -> Event:
         while not self._past.is_over and self.tick < last_tick:
             ticks = int(min(_LOOK_TICKS, last_tick - self.tick))
-            before = self.state if event in EVENTS else None
-            log, fault = self._advance(ticks)
-            if before and len(begins := _begins(event, log, before.past)):
-                if fault or begins[0] + 1 < len(log):  # again, and no further
-                    self.restore(before)._advance(int(begins[0]) + 1)
+            with interrupts_noted() as noted:  # one in between would leave it torn
+                fault, happened = self._look(ticks, event)
+            if noted:
+                signal.raise_signal(signal.Signals[noted[0]])
+            if happened:
                 return Event(event, self.tick)
             if fault:
                 raise FlightError(fault)
         return Event('end' if self._past.is_over else 'time', self.tick)
+
+    def _look(self, ticks: int, event: str) -> tuple[str, bool]:
+        """Fly some ticks, or to where it happens: what is not finite, and whether it happened."""
+        before = self.state if event in EVENTS else None
+        log, fault = self._advance(ticks)
+        if before and len(begins := _begins(event, log, before.past)):
+            if fault or begins[0] + 1 < len(log):  # again, and no further
+                self.restore(before)._advance(int(begins[0]) + 1)
+            return '', True
+        return fault, False
 
     def _advance(self, ticks: int) -> tuple[np.ndarray, str]:
         """Fly some ticks, one at least; their rows, float64[n, ROW], until one is not finite.
