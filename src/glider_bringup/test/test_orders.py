@@ -198,6 +198,20 @@ def test_who_is_at_the_end_of_its_path_flies_the_next_one(at_s, when):
     assert (run.score['status'], run.score['arrival']['arrived']) == ('completed', True)
 
 
+def test_a_path_beyond_the_sea_that_is_read_is_refused_as_in_a_scenario():
+    """So the orders of a flight are always those of a scenario that flies it again."""
+    sea = {'guidance.route': 'straight', 'orders': []}
+    flight = glider.Flight('eddies_10d', sea, duration=1200)
+    far = {'kind': 'waypoints', 'waypoints': [[0, 0, 0], [900_000, 0, 0]]}
+    with pytest.raises(ConfigurationError, match=r'^order: current.field.*beyond what is read'):
+        flight.order(path=far)
+    assert not flight.orders
+    flight.order(path={**far, 'waypoints': [[0, 0, 0], [9_000, 0, 0]]})
+    flight.until()
+    again = glider.fly('eddies_10d', {**sea, 'orders': flight.orders}, duration=1200)
+    assert again.to_xarray()['odom_north'].values[-1] == flight.now['odom_north']
+
+
 @pytest.mark.parametrize('told', [{'hold': True}, {'abort': True}, {'resume': True}])
 def test_who_has_arrived_is_told_something_there_and_has_arrived(told):
     short = {'kind': 'straight', 'length_m': 300.0}

@@ -608,7 +608,7 @@ def make_scenario(
     if not recorded:
         with named_in(f'{path}{changed}: '):
             _check_glide(scenario)
-            return _with_known_fields(scenario)
+            return with_known_fields(scenario)
     return scenario
 
 
@@ -652,7 +652,7 @@ def _check_glide(scenario: Scenario) -> None:
     PlantSettings(vehicle=scenario.vehicle, initial=scenario.initial).check()
 
 
-def _with_known_fields(scenario: Scenario) -> Scenario:
+def with_known_fields(scenario: Scenario) -> Scenario:
     """Scenario that says which files its currents are from, once they were read."""
     currents = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
     starts, is_charted = {}, bool(scenario.bathymetry.file)

@@ -30,7 +30,7 @@ from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.chart import in_metres
 from glider_mission.choices import combination_of
 from glider_mission.planned import refuse_planned_route
-from glider_mission.scenario import DEFAULT_SCENARIO, Scenario
+from glider_mission.scenario import DEFAULT_SCENARIO, Scenario, named_in, with_known_fields
 
 #: A vehicle that has been below the first depth and is above the second has surfaced (m).
 UNDER_M, SURFACED_M = 2.0, 1.0
@@ -261,10 +261,10 @@ class Flight:
         order = validate(Order, asked, 'order')
         if self._past.is_over:
             raise ConfigurationError('order: the mission is over (allowed: before its end)')
-        try:
+        with named_in('order: '):
+            if order.path:
+                with_known_fields(self.scenario.model_copy(update={'orders': [order]}))
             self._held.order(order)
-        except ConfigurationError as error:
-            raise ConfigurationError(f'order: {error}') from None
         self._past = self._past._replace(orders=(*self._past.orders, order))
         return order
 
