@@ -245,7 +245,8 @@ def test_score_file_does_not_stand_on_ticks_that_are_absent(run):
 )
 def test_number_that_is_none_ends_the_rows_where_it_is_scored(tmp_path, topic, why):
     """What a node refuses, the reader must not trip over, nor score."""
-    folder = make_run_folder(load_scenario('helix'), tmp_path / 'flight')
+    scenario = load_scenario('helix', {'duration_s': 3 * TICK_S})
+    folder = make_run_folder(scenario, tmp_path / 'flight')
     bag = BagWriter(folder, 'helix')
     for tick in range(3):
         for one in TOPICS.values():

@@ -60,7 +60,7 @@ def said(phase: str, stamp_ns: int, message: str = '') -> bytes:
 
 def write_bag(folder: Path, *reports: bytes, but: str = '') -> Path:
     """Run folder, as a launch makes it, with three ticks in its bag, ``but`` in the last only."""
-    scenario = load_scenario('helix')
+    scenario = load_scenario('helix', {'duration_s': 0.3})
     make_run_folder(scenario, folder)
     bag = BagWriter(folder, 'helix', attachments=[folder / name for name in ATTACHED])
     for tick in range(3):

@@ -277,8 +277,9 @@ def test_a_law_that_raises_ends_its_own_flight_only():
         return 0.0, 0.0
 
     changes = {}, None, raises, None, None, 300.0
+    minute = {'duration_s': 60.0, 'dives': 0, 'control.law': 'pid'}
     scenarios = {
-        (0, 'pid'): load_scenario('current_8deg', {'duration_s': 60.0, 'control.law': 'pid'}),
+        (0, 'pid'): load_scenario('current_8deg', minute),
         (1, 'raises'): chosen_scenario('current_8deg', *changes),
     }
     flights, _ = montecarlo.fly_plants(scenarios, Here(), None)
