@@ -14,7 +14,7 @@ import numpy as np
 from glider_base.errors import ConfigurationError, installed
 from glider_base.files import read_yaml
 from glider_flights.record import usable
-from glider_model.ocean.columns import only_valid
+from glider_model.ocean.grid_file import only_valid
 
 SUFFIXES = ('.nc', '.ncdf', '.nc4')
 #: Our unit in those of `variables.yaml`.

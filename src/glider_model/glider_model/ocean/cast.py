@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from glider_base.errors import ConfigurationError, installed, shown
+from glider_base.errors import ConfigurationError, installed
 from glider_base.kernel import kernel
 from glider_base.signals import SEA_WATER_DENSITY
-from glider_model.ocean.columns import MAX_ROWS, check_rows, is_height, only_valid, read_columns
+from glider_model.ocean.columns import MAX_ROWS, check_rows, is_height, read_columns
 from glider_model.ocean.density import SPECIFIC_WEIGHT, displacing, immersed
-from glider_model.ocean.grid_file import engine_of
+from glider_model.ocean.grid_file import LENGTHS, engine_of, only_valid, scale_of
 
 #: Columns of a file: density, or what it follows from by TEOS-10.
 COLUMNS = ('depth_m', 'density_kgpm3', 'temperature_degC', 'salinity_psu')
@@ -29,17 +29,12 @@ _STANDARD_NAMES = {
     'sea_water_practical_salinity': 'salinity_psu',
     'sea_water_salinity': 'salinity_psu',
 }
-#: m and dbar in units that NetCDF files have, in small letters.
-_UNITS = {
-    'depth_m': {
-        **dict.fromkeys(('', 'm', 'meter', 'meters', 'metre', 'metres'), 1.0),
-        **{'cm': 0.01, 'km': 1000.0},
-    },
-    'pressure_dbar': {
-        **dict.fromkeys(('', 'dbar', 'dbars', 'db', 'decibar', 'decibars'), 1.0),
-        **{'bar': 10.0, 'kpa': 0.1, 'hpa': 0.01, 'mbar': 0.01, 'pa': 1e-4},
-    },
+#: What numbers are multiplied by, and the unit of those that tell none.
+_PRESSURES = {
+    **dict.fromkeys(('dbar', 'decibar', 'dbars', 'decibars', 'db'), 1.0),
+    **{'bar': 10.0, 'kPa': 0.1, 'hPa': 0.01, 'mbar': 0.01, 'Pa': 1e-4},
 }
+_UNITS = {'depth_m': (LENGTHS, 'm'), 'pressure_dbar': (_PRESSURES, 'dbar')}
 #: What no water is beyond.
 RANGES = dict(zip(COLUMNS[1:], ((950.0, 1100.0), (-5.0, 50.0), (0.0, 60.0)), strict=True))
 #: Latitude (deg) of the gravity by which pressure follows from depth.
@@ -171,32 +166,25 @@ def density_of(
     return gsw.rho(salinity, conservative, pressure), temperature_degC
 
 
-def _numbers(name: str, known: str, variable) -> np.ndarray:
-    """Numbers of a variable of a file, NaN where they are not valid, depth in m or dbar."""
-    attrs, units = variable.attrs, _UNITS.get(known)
-    values = only_valid(np.asarray(variable.values, dtype=float), attrs, variable.encoding)
-    unit = str(attrs.get('units', '')).strip().lower()
-    if units and unit not in units:
-        allowed = ', '.join(filter(None, units))
-        raise ConfigurationError(f'{name}: units = {shown(unit)} (allowed: {allowed})')
-    return values * units[unit] if units else values
-
-
 def _read_netcdf(path: Path, source: str) -> list[tuple[int, dict[str, float]]]:
     """Samples of a cast by depth, those that lack a number left out, those of a depth averaged."""
     import xarray
 
     try:
         with xarray.open_dataset(path, engine=engine_of(path), decode_times=False) as dataset:
-            found = {}
+            found, told = {}, {}
             for name, variable in {**dataset.coords, **dataset.data_vars}.items():
                 known = _STANDARD_NAMES.get(variable.attrs.get('standard_name'), name)
                 if known in (*COLUMNS, 'pressure_dbar') and variable.ndim == 1:
-                    found.setdefault(known, _numbers(f'{source}: {name}', known, variable))
+                    values, attrs = np.asarray(variable.values, dtype=float), variable.attrs
+                    found.setdefault(known, only_valid(values, attrs, variable.encoding))
+                    told.setdefault(known, (f'{source}: {name}', attrs))
     except ConfigurationError:
         raise
     except (OSError, ValueError, TypeError, ImportError) as error:
         raise ValueError(f'{source}: not a NetCDF file that xarray reads: {error}') from None
+    for known in found.keys() & _UNITS.keys():
+        found[known] *= scale_of(*told[known], *_UNITS[known])
     if 'depth_m' not in found and 'pressure_dbar' in found:
         found['depth_m'] = 1e4 * found['pressure_dbar'] / SPECIFIC_WEIGHT
     found.pop('pressure_dbar', None)

@@ -16,7 +16,6 @@ from glider_base.files import read_text
 MAX_ROWS = 10_000
 #: Deepest point of a table (m).
 MAX_DEPTH_M = 12_000.0
-_VALID = ('valid_range', 'valid_min', 'valid_max')
 
 
 def read_columns(
@@ -106,19 +105,3 @@ def _number(text: str, where: str) -> float:
 def is_height(depths: np.ndarray) -> bool:
     """Whether depths are given as heights: none is below the surface, but some above it."""
     return bool(np.any(depths < 0.0) and not np.any(depths > 0.0))
-
-
-def only_valid(numbers: np.ndarray, attrs: dict, packed: dict) -> np.ndarray:
-    """Numbers of a variable of a NetCDF file, NaN where they are not valid by CF (2.5.1).
-
-    Limits of ``packed`` numbers that are whole numbers themselves are those of what is packed.
-    """
-    ends = attrs.get('valid_min', -math.inf), attrs.get('valid_max', math.inf)
-    low, high = limits = np.array(attrs.get('valid_range', ends)).astype(float)
-    kinds = [np.asarray(attrs[name]).dtype.kind for name in _VALID if name in attrs]
-    if 'scale_factor' in packed or 'add_offset' in packed:
-        scale, offset = packed.get('scale_factor', 1.0), packed.get('add_offset', 0.0)
-        if all(kind in 'iu' for kind in kinds):
-            low, high = sorted(scale * limits + offset)
-        low, high = low - 0.5 * abs(scale), high + 0.5 * abs(scale)  # as it is rounded
-    return np.where((numbers < low) | (numbers > high), math.nan, numbers)

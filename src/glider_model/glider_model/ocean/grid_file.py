@@ -20,7 +20,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError, installed
 from glider_base.files import is_file
-from glider_model.ocean.columns import is_height, only_valid
+from glider_model.ocean.columns import is_height
 
 if TYPE_CHECKING:
     import xarray
@@ -32,11 +32,13 @@ _SPEEDS = {
 }
 _CELSIUS = dict.fromkeys(('degrees_C', 'degree_C', 'degC', 'Celsius', 'celsius', 'deg_C'), 1.0)
 _PSU = dict.fromkeys(('1e-3', '0.001', 'psu', 'PSU', '1'), 1.0)
-_LENGTHS = {
+LENGTHS = {
     **dict.fromkeys(('m', 'meter', 'meters', 'metre', 'metres'), 1.0),
     **dict.fromkeys(('cm', 'centimeter', 'centimeters'), 0.01),
+    'km': 1000.0,
 }
 _AXES = ('time', 'depth', 'latitude', 'longitude')
+_VALID = ('valid_range', 'valid_min', 'valid_max')
 
 
 class Wanted(NamedTuple):
@@ -83,7 +85,7 @@ BOTTOM = (
             **{'deptho': 'sea_floor_depth_below_geoid', 'bathymetry': 'sea_floor_depth'},
             **{name: name for name in (*_HEIGHTS, *_BELOW)},
         },
-        *(_LENGTHS, 'm', -9000.0, 12000.0),
+        *(LENGTHS, 'm', -9000.0, 12000.0),
     ),
 )
 #: What a grid is for, and what is read of it; a file may have several.
@@ -297,12 +299,31 @@ def _times(variable: 'xarray.Variable') -> np.ndarray:
     return values.astype('datetime64[ns]').astype(np.int64) / 1e9
 
 
-def _scale(name: str, attrs: dict, units: dict[str, float]) -> float:
-    """What the numbers of a variable are multiplied by, as its attributes tell."""
-    unit = str(attrs.get('units', 'm' if units is _LENGTHS else '')).strip()
-    if unit not in units:
+def scale_of(name: str, attrs: dict, units: dict[str, float], usual: str = '') -> float:
+    """What the numbers of a variable are multiplied by, as its attributes tell.
+
+    Those that tell no unit are in the ``usual`` one. A ValueError names the units that there are.
+    """
+    unit, known = str(attrs.get('units') or usual).strip(), {one.lower(): one for one in units}
+    if unit.lower() not in known:
         raise ValueError(f'{name}: units = {unit!r} (allowed: {", ".join(units)})')
-    return units[unit]
+    return units[known[unit.lower()]]
+
+
+def only_valid(numbers: np.ndarray, attrs: dict, packed: dict) -> np.ndarray:
+    """Numbers of a variable of a file, NaN where they are not valid by CF (2.5.1).
+
+    Limits of ``packed`` numbers that are whole numbers themselves are those of what is packed.
+    """
+    ends = attrs.get('valid_min', -math.inf), attrs.get('valid_max', math.inf)
+    low, high = limits = np.array(attrs.get('valid_range', ends)).astype(float)
+    kinds = [np.asarray(attrs[name]).dtype.kind for name in _VALID if name in attrs]
+    if 'scale_factor' in packed or 'add_offset' in packed:
+        scale, offset = packed.get('scale_factor', 1.0), packed.get('add_offset', 0.0)
+        if all(kind in 'iu' for kind in kinds):
+            low, high = sorted(scale * limits + offset)
+        low, high = low - 0.5 * abs(scale), high + 0.5 * abs(scale)  # as it is rounded
+    return np.where((numbers < low) | (numbers > high), math.nan, numbers)
 
 
 def _allowed(wanted: tuple[Wanted, ...]) -> tuple[str, ...]:
@@ -327,13 +348,14 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
     for one, (name, standard) in zip(wanted, found, strict=True):
         attrs = dataset[name].attrs
         points = attrs.get('positive', 'up' if standard in _HEIGHTS else 'down')
-        scales.append(_scale(name, attrs, one.units) * (-1.0 if points == 'up' else 1.0))
+        usual = 'm' if wanted is BOTTOM else ''
+        scales.append(scale_of(name, attrs, one.units, usual) * (-1.0 if points == 'up' else 1.0))
     values = {axis: np.zeros(1) for axis in _AXES[:2]}
     for axis, dimension in axes.items():
         one = dataset.variables[dimension]
         values[axis] = _times(one) if axis == 'time' else np.array(one.values, dtype=float)
         if axis == 'depth':
-            scale = _scale(dimension, one.attrs, _LENGTHS)
+            scale = scale_of(dimension, one.attrs, LENGTHS, 'm')
             is_up = one.attrs.get('positive') == 'up' or is_height(values[axis])
             values[axis] *= scale * (-1.0 if is_up else 1.0)
             if len(one) and values[axis].max() < 0.0:
