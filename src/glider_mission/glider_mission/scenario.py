@@ -653,7 +653,10 @@ def _check_glide(scenario: Scenario) -> None:
 
 
 def with_known_fields(scenario: Scenario) -> Scenario:
-    """Scenario that says which files its currents are from, once they were read."""
+    """Scenario that says which files its currents are from, once they were read.
+
+    A ConfigurationError tells of a file, or of a path through what is not in it, or over land.
+    """
     currents = {'current': scenario.current, 'navigation.forecast': scenario.navigation.forecast}
     starts, is_charted = {}, bool(scenario.bathymetry.file)
     for name, current in currents.items():

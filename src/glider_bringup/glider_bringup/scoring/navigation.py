@@ -90,8 +90,8 @@ class NavigationScorer:
             self._way, self._waits_for_fix = _Way(), False
             return
         estimated = row[_BELIEVED : _BELIEVED + 2]
+        # by the dive segment before
         if self._was_fixed and self._tells and np.all(np.isfinite(estimated)):
-            # by the dive segment before
             self._surfacings[-1]['dac_believed_mps'] = _north_east(estimated)
             self._dac_errors.append(math.dist(estimated, self._mean_current))
         ticks = max(1, self._way.ticks)

@@ -366,29 +366,30 @@ class Scorer:
         if ended and arrival and not arrival['arrived']:
             return f'came up {arrival["missed_m"]:,.0f} m from the last point of its path'
         is_done = 0 < rules.dives <= dives
+        goes_on = not ended and not is_done
         if rules.duration_s - time_s > TICK_S:
             # who has arrived, or is to go on, may be done before
-            if (arrival or self._ordered) and not ended and not is_done:
+            if (arrival or self._ordered) and goes_on:
                 return 'afloat for longer than it was to wait, before the end of its path'
             later_s = [one.at_s for one in self._waiting if one.path]
             if later_s and min(later_s) < rules.duration_s and not is_done:
                 return f'over before another path was ordered, at {min(later_s):,.0f} s'
             return ''
         stays = [order for order in self._followed if order.hold or order.resume]
-        goes_on = dives < max(1, rules.dives) or (arrival and not is_done)
-        if stays and stays[-1].hold and goes_on and not ended:
+        has_more = rules.dives or arrival or not dives
+        if goes_on and has_more and stays and stays[-1].hold:
             return f'held at the surface as ordered at {stays[-1].at_s:,.0f} s, and not resumed'
         in_time = min(rules.dives, int(rules.duration_s / rules.dive_s))
-        if dives < in_time and not ended:
+        if goes_on and dives < in_time:
             return f'dives flown, of those that there was time for: {dives} of {in_time}'
         is_led_aground = self._bottom and self._bottom.touched_tick is not None
         if rules.dives_at_all and not dives and (is_led_aground or not _dives_at_all(depth)):
             return 'no dive flown, for which there was time'
-        if rules.dives_at_all and not ended and not is_done and _idles(depth, rules):
+        if goes_on and rules.dives_at_all and _idles(depth, rules):
             return f'no dive flown in its last {rules.dive_s:,.0f} s, ample for one'
         since, way_m = task
         ample_s = rules.spare_s + rules.pace_s * way_m
-        if arrival and not ended and not is_done and time_s - seconds(since) >= ample_s:
+        if goes_on and arrival and time_s - seconds(since) >= ample_s:
             off = f'{arrival["missed_m"]:,.0f} m from its last point'
             return f'not at the end of its path, for which there was time in still water: {off}'
         return ''
