@@ -18,19 +18,19 @@ from glider_base.kernel import kernel
 def doubled(number):
     return number + number
 """
-#: Compiles it for a type, and takes its time between looking for a free name and taking it.
+#: Compiles it for a type, and takes its time between writing what is kept and giving it its name.
 COMPILE = """
 import sys, time
-from numba.core.caching import IndexDataCacheFile
+from pathlib import Path
 from doubling import doubled
 
-save = IndexDataCacheFile._save_index
+replace = Path.replace
 
-def save_late(self, overloads):
+def replace_late(self, target):
     time.sleep(2.0)
-    save(self, overloads)
+    return replace(self, target)
 
-IndexDataCacheFile._save_index = save_late
+Path.replace = replace_late
 doubled(eval(sys.argv[1]))
 """
 #: What a later process finds, and whether it has loaded what numba compiles with.
@@ -63,6 +63,16 @@ def test_processes_that_compile_for_different_types_do_not_get_each_others_code(
     assert [one.wait(60.0) for one in both] == [0, 0]
     found, _ = start(FIND).communicate(timeout=300.0)
     assert found.split() == ['6', '0.5', '0', 'False']
+
+
+@pytest.mark.parametrize('left', [0, 0.5])
+def test_what_a_crash_has_cut_is_compiled_once_more(start, tmp_path, left):
+    assert start(FIND).wait(300.0) == 0
+    for path in (tmp_path / 'cache').rglob('doubled.*'):
+        os.truncate(path, int(left * path.stat().st_size))
+    for misses in ('2', '0'):
+        found, _ = start(FIND).communicate(timeout=300.0)
+        assert found.split()[:3] == ['6', '0.5', misses]
 
 
 #: Modules of a package: one kernel calls another's, one a slot that is filled elsewhere.
@@ -255,10 +265,9 @@ def test_what_was_not_used_for_longest_is_forgotten_first(monkeypatch, tmp_path)
     inside = kernel_cache.folder() / 'parts.low'
     inside.mkdir(parents=True)
     for age, name in enumerate(('new', 'old')):
-        for file in (f'{name}.py311.nbi', f'{name}.py311.1.nbc'):
-            (inside / file).write_bytes(bytes(100))
-        os.utime(inside / f'{name}.py311.nbi', (1e9 - age, 1e9 - age))
-    kernel_cache.forget_old(400)
-    assert len(list(inside.iterdir())) == 4
-    kernel_cache.forget_old(399)
-    assert {path.name for path in inside.iterdir()} == {'new.py311.nbi', 'new.py311.1.nbc'}
+        (inside / name).write_bytes(bytes(100))
+        os.utime(inside / name, (1e9 - age, 1e9 - age))
+    kernel_cache.forget_old(200)
+    assert len(list(inside.iterdir())) == 2
+    kernel_cache.forget_old(199)
+    assert [path.name for path in inside.iterdir()] == ['new']

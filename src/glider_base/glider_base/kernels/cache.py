@@ -9,10 +9,10 @@ program nobody knows whether the program runs what is in it: nothing that can co
 or looked for.
 """
 
-import fcntl
 import hashlib
 import importlib.util
 import os
+import pickle
 import re
 import sys
 import time
@@ -24,8 +24,10 @@ from typing import NamedTuple
 
 import numba
 from numba.core import types
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
 
 from glider_base.kernels.compiler import OPTIONS
 
@@ -56,7 +58,9 @@ _STARTED_S = time.time()
 
 @cache
 def _file_of(module: str) -> str | None:
-    """Python source of a module, imported or not; None if there is none."""
+    """Python source of a module, imported or not; None if there is none, or it is of Python."""
+    if module.partition('.')[0] in sys.stdlib_module_names and module != '__main__':
+        return None
     if module in sys.modules:
         path = getattr(sys.modules[module], '__file__', None)
     elif '.' in module:
@@ -78,11 +82,10 @@ def _file_of(module: str) -> str | None:
 
 def _counts(module: str) -> bool:
     """Whether kernels can come from a module: it is ours, a user's, or of a holder of kernels."""
-    top = module.partition('.')[0]
-    if top in sys.stdlib_module_names and top != '__main__':
-        return False
     path = _file_of(module)
-    return path is not None and (top in HOLDERS or not any(one in path for one in _INSTALLED))
+    if path is None:
+        return False
+    return module.partition('.')[0] in HOLDERS or not any(one in path for one in _INSTALLED)
 
 
 @cache
@@ -96,7 +99,7 @@ def _source(module: str) -> tuple[bytes, frozenset[str]]:
             names |= {f'{origin}.{one}' for one in re.findall(r'\w+', members)}
         names |= {part.split()[0] for part in plain.split(',') if part.strip()}
     parents = {name[:at] for name in names for at in range(len(name)) if name[at] == '.'}
-    return hashlib.sha256(data).digest(), frozenset(names | parents)
+    return hashlib.sha256(data).digest(), frozenset(filter(_file_of, names | parents))
 
 
 def _reach(modules: Iterable[str], seen: dict[str, bytes]) -> None:
@@ -165,100 +168,71 @@ def folder() -> Path:
     return Path(os.environ.get('GLIDER_CACHE') or default, 'kernels')
 
 
-class _Locator:
-    """Where a kernel is kept: a folder of its module's name, wherever its source lies."""
+class KernelCache(NullCache):
+    """What was compiled of a kernel: a file for each signature, written at once or not at all."""
 
-    def __init__(self, function) -> None:
-        self._py_file = function.__code__.co_filename  # numba names it in warnings
-        self._folder = str(folder() / function.__module__)
-
-    @classmethod
-    def from_function(cls, function, _):
-        return cls(function)
-
-    def ensure_cache_path(self) -> None:
-        """Nothing: the folder is made for what is kept first."""
-
-    def get_cache_path(self) -> str:
-        return self._folder
-
-    def get_source_stamp(self) -> str:
-        return ''
-
-    def get_disambiguator(self) -> str:
-        return ''
-
-
-class _Impl(CompileResultCacheImpl):
-    _locator_classes = (_Locator,)
-
-
-class KernelCache(FunctionCache):
-    """numba's cache of a function, which one process at a time adds to.
-
-    numba looks for a free name, writes the index and then the file. Two processes that compile a
-    function for different types at the same time would give their code the same name, and one of
-    them would later run that of the other.
-    """
-
-    _impl_class = _Impl
     made = 0  #: so many; for a kernel that is imported anew, another one
 
     def __init__(self, function, ending: str = '') -> None:
-        super().__init__(function)
         KernelCache.made += 1
-        self._ending = ending  #: of the names of its files
+        self._function, self._ending = function, ending  #: of the names of its files
         HOLDERS.add(function.__module__.partition('.')[0])
 
-    def _select(self, sig) -> bool:
-        """Turn to what is kept of the sources as they are, for a signature; whether anything is.
+    @property
+    def cache_path(self) -> str:
+        """Folder of the kernels of its module, wherever their source lies."""
+        return str(folder() / self._function.__module__)
+
+    def _file(self, sig, codegen) -> Path | None:
+        """Where the code for a signature is kept; None if it can be of no use to another session.
 
         Classes of a notebook, the program itself and functions are made anew in each session.
         """
         kinds = getattr(sig, 'args', sig)
         classes = list(_classes(kinds))
         if any(one.__module__ == '__main__' or '<locals>' in one.__qualname__ for one in classes):
-            return False
-        modules = {one.__module__ for one in classes} | {self._py_func.__module__}
+            return None
+        own = self._function
+        modules = {one.__module__ for one in classes} | {own.__module__}
         digest = closure(frozenset(modules), len(BODIES), KernelCache.made)
         if digest is None:
-            return False
-        own = hashlib.sha256(' '.join(kind.name for kind in kinds).encode()).hexdigest()[:16]
-        # an index of one signature: of all that are in it numba makes the types
-        name = f'{self._impl.filename_base}{self._ending}.{digest}.{own}'
-        self._cache_file = IndexDataCacheFile(self._cache_path, name, digest)
-        return True
+            return None
+        cells = dumps([cell.cell_contents for cell in own.__closure__ or ()])
+        names = sorted({f'{one.__module__}.{one.__qualname__}' for one in classes})
+        told = [kind.name for kind in kinds], names, own.__code__.co_code, cells
+        told = repr((sys.implementation.cache_tag, codegen.magic_tuple(), *told))
+        which = hashlib.sha256(told.encode()).hexdigest()[:16]
+        return Path(self.cache_path, f'{own.__qualname__}{self._ending}.{digest}.{which}')
 
     def load_overload(self, sig, target_context):
         """What was compiled for a signature, or None."""
-        if not self._select(sig):
+        path = self._file(sig, target_context.codegen())
+        if path is None:
             return None
         if OPTIONS:  # else numba loads all that it compiles with
             rtsys.initialize(target_context)
         else:
             target_context.refresh()
-        found = None
-        with suppress(NotADirectoryError, PermissionError):  # which is said when it is to be kept
-            found = self._load_overload(sig, target_context)
-        if found is not None:
-            path = self._cache_file._index_path
-            if time.time() - os.stat(path).st_mtime > USED_S:
+        try:
+            found = pickle.loads(path.read_bytes())
+            if time.time() - path.stat().st_mtime > USED_S:
                 os.utime(path)
-        return found
+        except (OSError, EOFError, pickle.UnpicklingError):  # none, or cut by a crash
+            return None
+        return CompileResult._rebuild(target_context, *found)
 
     def save_overload(self, sig, data) -> None:
         """Save what was compiled for a signature, if it can be of use to another session."""
-        if not self._select(sig):
+        path = self._file(sig, data.codegen)
+        if path is None or data.library.has_dynamic_globals:
             return
+        partial = path.with_name(f'{path.name}.{os.getpid()}')
         try:
-            os.makedirs(self.cache_path, exist_ok=True)
-            lock = open(os.path.join(self.cache_path, 'lock'), 'w')
+            path.parent.mkdir(parents=True, exist_ok=True)
+            partial.write_bytes(dumps(data._reduce()))
+            partial.replace(path)
         except OSError as error:
             _say_unkept(str(folder()), error.strerror)
-            return
-        with lock:
-            fcntl.flock(lock, fcntl.LOCK_EX)
-            super().save_overload(sig, data)
 
 
 @cache
@@ -274,14 +248,13 @@ def _say_unkept(place: str, why: str) -> None:
 def forget_old(largest: int = LARGEST) -> None:
     """Remove what has not been used for longest, until the rest is not larger (bytes)."""
     found = []
-    for index in folder().rglob('*.nbi'):
-        files = [index, *index.parent.glob(f'{index.stem}.*.nbc')]
-        status = [one.stat() for one in files]
-        found.append((status[0].st_mtime, sum(one.st_size for one in status), files))
+    for path in folder().rglob('*'):
+        with suppress(FileNotFoundError):  # its name was for the time of writing
+            status = path.stat()
+            found += [(status.st_mtime, status.st_size, path)] if path.is_file() else []
     size = sum(one[1] for one in found)
-    for _, own, files in sorted(found):
+    for _, own, path in sorted(found):
         if size <= largest:
             return
         size -= own
-        for path in files:
-            path.unlink(missing_ok=True)
+        path.unlink(missing_ok=True)

@@ -21,8 +21,10 @@ from numba.core.typed_passes import NativeLowering
 from numba.core.typing import typeof
 
 WRITTEN_FOR = '0.61.'
-#: Kind of a library in the cache; how names of environments of functions begin in a module.
-_BITCODE, _ENVIRONMENT = 'inlined', '_ZN08NumbaEnv'
+#: Kinds of a library in the cache: of a kernel that others inline, of one that is called.
+_BITCODE, _MACHINE_CODE = 'inlined', 'called'
+#: How names of environments of functions begin in a module.
+_ENVIRONMENT = '_ZN08NumbaEnv'
 #: Code of so many basic blocks, as the tick of a block has, is large. Passes over it, by their
 #: names in llvmlite, are those of -O3, but none over loops.
 _LARGE = 500
@@ -44,7 +46,7 @@ def _blocks_of(module):
 class _Library(JITCodeLibrary):
     """Code of a kernel. The engine that makes machine code never gets one that is inlined."""
 
-    is_kernel = is_inlined = False
+    is_kernel = is_inlined = is_read = False
 
     def _optimize_final_module(self):
         is_run = self.is_kernel and not self.is_inlined
@@ -72,6 +74,8 @@ class _Library(JITCodeLibrary):
 
     def get_pointer_to_function(self, name):
         """Address of a function; 0 of one that is inlined, for there is none."""
+        if self.is_read:  # what it defines was not listed
+            return self._codegen._engine.get_function_address(name)
         return 0 if self.is_inlined else super().get_pointer_to_function(name)
 
     @property
@@ -83,20 +87,28 @@ class _Library(JITCodeLibrary):
         """Nothing to set before it is inlined."""
 
     def serialize_using_object_code(self):
-        """What goes to the cache."""
-        if not self.is_inlined:
+        """What goes to the cache: nobody inlines a kernel that is called."""
+        if not self.is_kernel:
             return super().serialize_using_object_code()
         self._ensure_finalized()
-        return self.name, _BITCODE, self._get_module_for_linking().as_bitcode()
+        if self.is_inlined:
+            return self.name, _BITCODE, self._get_module_for_linking().as_bitcode()
+        return self.name, _MACHINE_CODE, self._get_compiled_object()
 
     @classmethod
     def _unserialize(cls, codegen, state):
         name, kind, data = state
-        if kind != _BITCODE:
+        if kind not in (_BITCODE, _MACHINE_CODE):
             return super()._unserialize(codegen, state)
         library = cls(codegen, name)
-        library.is_inlined = library._finalized = True
-        library._shared_module = ll.parse_bitcode(data)
+        if kind == _BITCODE:
+            library.is_inlined = library._finalized = True
+            library._shared_module = ll.parse_bitcode(data)
+            return library
+        library.enable_object_caching()
+        library._set_compiled_object(data)
+        library._finalize_final_module()
+        library.is_read = True
         return library
 
 
