@@ -246,10 +246,10 @@ signal.signal(signal.SIGTERM, end_as_interrupt)
 flies = HeldMission.fly
 
 
-def fly_struck(self, log):
+def fly_struck(self, log, halts=False):
     if shot and len(log):  # the first one compiles
         signal.setitimer(signal.ITIMER_REAL, 0.002)
-    return flies(self, log)
+    return flies(self, log, halts)
 
 
 HeldMission.fly = fly_struck

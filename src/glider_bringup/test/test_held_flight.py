@@ -125,7 +125,9 @@ def test_ctrl_c_leaves_it_between_two_ticks(monkeypatch):
     fly = HeldMission.fly
     with monkeypatch.context() as patch:
         patch.setattr(
-            HeldMission, 'fly', lambda *held: (fly(*held), signal.raise_signal(signal.SIGINT))[0]
+            HeldMission,
+            'fly',
+            lambda *held, **how: (fly(*held, **how), signal.raise_signal(signal.SIGINT))[0],
         )
         with pytest.raises(KeyboardInterrupt):
             one.until('surfacing', t_s=300.0)

@@ -65,7 +65,7 @@ def record(held, out):
         joints = held.plant.state.joints
         channels = held.control.state.law.channels
         th_p, th_q = channels.roll_theta, channels.pitch_theta
-        _, finished = fly_held(held, log, TICK_S)
+        _, finished = fly_held(held, log, False, TICK_S)
         measured, channels = held.control.state.measured, held.control.state.law.channels
         roll, pitch, polar = channels.roll, channels.pitch, params.polar
         phi, theta = measured.phi, measured.theta

@@ -26,6 +26,7 @@ from glider_guard.block import guard_tick
 from glider_guard.guard import GuardParams, GuardState
 from glider_guidance.block import guidance_tick
 from glider_guidance.guidance import GuidanceParams, GuidanceState
+from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import BLOCK_TICKS, COLUMNS, ROW
 from glider_model.ocean.current import CurrentParams, CurrentState, current_in_place
 from glider_model.plant.block import Measured, plant_move, plant_outputs
@@ -79,7 +80,7 @@ def _joined(blocks):
 
 
 @kernel
-def fly_held(held, log, dt):
+def fly_held(held, log, halts, dt):
     """Rows filled, and whether the mission has ended; see `HeldMission.fly`."""
     in_plant, plant = held.plant.params, held.plant.state
     in_current, current = held.current.params, held.current.state
@@ -102,7 +103,7 @@ def fly_held(held, log, dt):
         navigation, estimated, phase = navigation_tick(
             navigation, t_s, (joints, *sensors), in_navigation, dt
         )
-        odom = estimated[0]
+        odom, before = estimated[0], guidance.profile.stage
         guidance, guided, stage = guidance_tick(
             guidance, t_s, (odom, measured.altitude), in_guidance, dt
         )
@@ -115,7 +116,7 @@ def fly_held(held, log, dt):
         said = (phase, stage, limits, reported)
         put(log, row, 0, (*numbers, water, *estimated, *guided, *controlled, *guarded, *said))
         rows = row + 1
-        if finished:
+        if finished or (halts and stage[0] == AT_END_OF_PATH != before):
             break
     held.current.state = CurrentState(flown + rows, values)
     held.plant.state, held.navigation.state = plant, navigation
@@ -151,13 +152,14 @@ class HeldMission:
                 block.set_params(own)
         self._params = params
 
-    def fly(self, log: np.ndarray) -> tuple[int, bool]:
+    def fly(self, log: np.ndarray, halts: bool = False) -> tuple[int, bool]:
         """Fly until the log, float64[n, ROW], is full or the mission ends.
 
-        Returns how many rows were filled, and whether the mission has ended. Where a law raises,
-        the state has not changed.
+        If it ``halts``, no further than where it comes to the end of its path. Returns how many
+        rows were filled, and whether the mission has ended. Where a law raises, the state has not
+        changed.
         """
-        return fly_held(self.blocks, log, TICK_S)
+        return fly_held(self.blocks, log, halts, TICK_S)
 
 
 def fly(

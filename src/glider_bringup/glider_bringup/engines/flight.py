@@ -37,6 +37,7 @@ from glider_guidance.orders import (
     wait_for_surface,
 )
 from glider_guidance.status import Status, status_of
+from glider_guidance.yo.stage import AT_END_OF_PATH
 from glider_mission.blocks import COLUMNS, ROW
 from glider_mission.disk import VANISHED, DiskError
 from glider_mission.routing.pilot import LOOK_TICKS, Pilot
@@ -196,12 +197,13 @@ class Held:
 
     def _until_ordered(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, but not beyond where an order waits for the surface, or is a reaction."""
-        before = self._held.state if len(log) > 1 else None
-        rows, is_over = self._until_raised(log)
-        if before is None:
-            return rows, is_over
         waits = wait_for_surface(self.past.waiting, self.past.tick)
         reacts = self._settings.no_progress != 'tell'
+        drifts = self.past.stage == AT_END_OF_PATH  # and may miss it; it halts where that begins
+        if len(log) == 1 or not (waits or reacts or drifts):
+            return self._until_raised(log)
+        before = self._held.state
+        rows, is_over = self._until_raised(log)
         up = np.flatnonzero(is_surfaced(log[:rows, _STAGE])) if waits else ()
         stays = begins(log[:rows, _NO_PROGRESS], self.past.no_progress) if reacts else ()
         astray = np.flatnonzero(self._judged_end(log[:rows])[0])
@@ -214,7 +216,7 @@ class Held:
     def _until_raised(self, log: np.ndarray) -> tuple[int, bool]:
         """Fill a log, or a part of it, if a law raises in the rest; a FlightError, if at once."""
         try:
-            return self._held.fly(log)
+            return self._held.fly(log, halts=True)
         except Exception as error:
             if len(log) > 1:
                 return self._until_raised(log[: len(log) // 2])
