@@ -237,6 +237,16 @@ def test_a_mission_that_is_too_short_is_not_reachable():
     assert made.wh is None
 
 
+def test_a_mission_that_is_over_between_its_front_and_its_sail_is_not_reachable():
+    """Fronts run straight from point to point; a vehicle sails a little longer."""
+    ample = plan(load_scenario('eddies_hard'))
+    front_s, sailed = ample.route.passed_s[-1], ample.waypoints_s[-1]
+    assert front_s + 60.0 < sailed
+    made = plan(load_scenario('eddies_hard', {'duration_s': 0.5 * (front_s + sailed)}))
+    assert made.arrival_s(50.0) == math.inf
+    assert not made.reachable
+
+
 def test_a_helix_is_not_planned_along_a_chord_nor_a_path_that_is_followed_down_as_dives():
     with pytest.raises(ConfigurationError, match='path.kind = helix: no legs'):
         plan(load_scenario('helix'))

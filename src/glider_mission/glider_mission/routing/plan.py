@@ -79,8 +79,9 @@ class Plan(NamedTuple):
 
     @property
     def reachable(self) -> bool:
-        """Whether it gets there in the time, by the forecast."""
-        return self.route.arrives or math.isfinite(self.straight_s)
+        """Whether it gets there in the time, as it sails by the forecast."""
+        is_led = len(self.route.ends) == len(self.route.fronts)
+        return is_led and all(map(math.isfinite, self.waypoints_s))
 
     def arrival_s(self, percent: float) -> float:
         """Arrival (s) that so many of the errors that were tried keep; infinite: not in time."""
@@ -374,9 +375,10 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
     straight_s, arrivals = math.inf, []
     if not crossing(chart, land, bottom, waypoints):
         straight_s = sailed_s(chart, waypoints, 0.0, pace.speed, end_s)
-    if not route.arrives and math.isfinite(straight_s):
-        route = route._replace(corners=waypoints, ends=[*range(1, len(waypoints))])
     made = Plan(route, np.empty(0), straight_s, pace, chart, end_s)
+    if not made.reachable and math.isfinite(straight_s):
+        route = route._replace(corners=waypoints, ends=[*range(1, len(waypoints))])
+        made = made._replace(route=route)
     for sea in with_errors(chart, scenario.forecast.error_mps, scenario):
         s = sailed_s(sea, route.corners, 0.0, pace.speed, end_s) if made.reachable else math.inf
         arrivals.append(s)
