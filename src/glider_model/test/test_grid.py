@@ -336,6 +336,17 @@ def test_what_is_no_file_is_refused(tmp_path):
         load(tmp_path / 'text.nc')
 
 
+def test_a_file_whose_numbers_were_damaged_on_the_way_is_named(tmp_path):
+    pytest.importorskip('h5netcdf')
+    path, data = tmp_path / 'sea.nc', dataset()
+    data.to_netcdf(path, engine='h5netcdf', encoding={name: {'zlib': True} for name in data})
+    whole = path.read_bytes()
+    half = len(whole) // 2  # among what is packed
+    path.write_bytes(whole[:half] + bytes(1000) + whole[half + 1000 :])
+    with pytest.raises(ConfigurationError, match=f'file {path}: .*read data'):
+        load(path)
+
+
 @pytest.mark.parametrize('read', [load, read_cast])
 def test_who_lacks_a_library_for_netcdf_4_is_told_which(read, tmp_path, monkeypatch):
     path = tmp_path / 'sea.nc'

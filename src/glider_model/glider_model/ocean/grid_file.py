@@ -182,7 +182,7 @@ def _opened(path: Path) -> Iterator['xarray.Dataset']:
     with dataset:
         try:
             yield dataset
-        except ValueError as error:
+        except (ValueError, OSError) as error:  # also of numbers that cannot be unpacked
             raise ConfigurationError(f'file {path}: {error}') from None
 
 
