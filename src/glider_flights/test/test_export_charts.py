@@ -187,6 +187,15 @@ def test_lines_are_cut_where_they_cross_the_date_line(tmp_path):
         assert -180.0 <= read.geospatial_lon_max < -179.99
 
 
+def test_a_track_is_on_the_date_line_when_it_crosses_it():
+    """A quarter of the way between two points that are four minutes apart."""
+    ends = (36.0, 179.9, 0.0, '2026-03-01T00:00:00Z'), (36.2, -179.7, 40.0, '2026-03-01T00:04:00Z')
+    west, east = tracks._parts([tracks.Row(*one) for one in ends])
+    there = pytest.approx(36.05), 180.0, 10.0, '2026-03-01T00:01:00Z'
+    assert west[-1] == there
+    assert east[0] == west[-1]._replace(longitude=-180.0)
+
+
 def test_kml_and_gpx_say_the_same_as_geojson(export):
     fastkml, gpxpy = pytest.importorskip('fastkml'), pytest.importorskip('gpxpy')
     features = json.loads(export('geojson').read_text())['features']

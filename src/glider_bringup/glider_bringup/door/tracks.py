@@ -27,6 +27,7 @@ from glider_mission.scenario import Scenario
 
 #: A track has no more points than this: more are slow to draw in a browser.
 MOST_POINTS = 4000
+_TIME = '%Y-%m-%dT%H:%M:%SZ'
 KML, GPX = 'http://www.opengis.net/kml/2.2', 'http://www.topografix.com/GPX/1/1'
 
 
@@ -91,7 +92,7 @@ def chart_of(flown: FlownRun, began_s: float | None) -> Chart:
         if began_s is None:
             return ''
         moment = datetime.fromtimestamp(began_s, timezone.utc) + timedelta(seconds=float(t_s))
-        return f'{moment:%Y-%m-%dT%H:%M:%SZ}'
+        return f'{moment:{_TIME}}'
 
     traces = flown.traces.thinned(MOST_POINTS)
     samples, tracks = traces.samples, {}
@@ -133,6 +134,9 @@ def _parts(line: list[Row]) -> list[list[Row]]:
             if one.depth_m is not None:
                 depth = one.depth_m + share * (after.depth_m - one.depth_m)
                 there = there._replace(depth_m=round(depth, 2))
+            if one.time:
+                began, ended = (datetime.strptime(row.time, _TIME) for row in (one, after))
+                there = there._replace(time=f'{began + share * (ended - began):{_TIME}}')
             parts[-1].append(there)
             parts.append([there._replace(longitude=-edge)])
         parts[-1].append(after)
