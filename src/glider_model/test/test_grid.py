@@ -12,6 +12,7 @@ import xarray
 from glider_base.frames import OriginSettings, from_geodetic
 from glider_base.settings import ConfigurationError, validate
 from glider_base.signals import SEA_WATER_DENSITY
+from glider_model.ocean import grid_file
 from glider_model.ocean.bottom import BathymetrySettings, bottom_depth
 from glider_model.ocean.cast import read_cast
 from glider_model.ocean.current import current_initial, current_step
@@ -397,6 +398,16 @@ def test_another_file_is_told_from_the_one_that_was_flown(tmp_path):
     written(dataset(seed=7), path)
     with pytest.raises(ValueError, match='not the one that was flown'):
         known.known()
+
+
+def test_steps_of_a_window_are_read_together(tmp_path, monkeypatch):
+    """Those that are packed together are unpacked once; the water is that of step by step."""
+    path, reads, cut = written(dataset(), tmp_path / 'sea.nc'), [], grid_file._cut
+    monkeypatch.setattr(grid_file, '_cut', lambda *given: reads.append(given) or cut(*given))
+    together = load(path)
+    assert len(reads) == 2
+    monkeypatch.setattr(grid_file, '_BLOCK_BYTES', 1)
+    np.testing.assert_array_equal(load(path).water, together.water)
 
 
 def test_of_a_large_file_the_window_alone_is_read(tmp_path):

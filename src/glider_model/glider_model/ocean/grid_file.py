@@ -101,6 +101,8 @@ _OTHER_GRIDS = {
 }
 #: Bytes of a window at most.
 MAX_BYTES = 400_000_000
+#: Of it so many bytes are read at once: what is packed in steps together is not unpacked for each.
+_BLOCK_BYTES = 50_000_000
 #: A place is not beyond a file by what it was rounded, be it to float32 (deg): a metre.
 EDGE_DEG = 1e-5
 #: A step of an axis is a hole if it is so many times as wide as those beside it.
@@ -513,21 +515,22 @@ def _read(
     water = np.empty((*shape, len(layout.variables)), dtype=np.float32)
     present = {axis: layout.axes[axis] for axis in _AXES if axis in layout.axes}
     is_bottom, land = 'time' not in present, np.zeros(shape[2:], dtype=bool)
-    for step, index in enumerate(chosen['time']):
-        now = {**chosen, 'time': np.array([index])}
+    at_once = max(1, _BLOCK_BYTES // (8 * math.prod(shape[1:])))
+    for begin in range(0, shape[0], at_once):
+        now = {**chosen, 'time': chosen['time'][begin : begin + at_once]}
         for component, name in enumerate(layout.variables):
-            read = _cut(layout.dataset[name], present, now).reshape(shape[1:])
-            read = layout.scales[component] * read
-            what = name if is_bottom else f'{name} at {time_text(axes.times[step])}'
-            _refuse_no_water(what, read, wanted[component], is_needed)
-            dry = ~np.isfinite(read)
-            filled = _fill_land(read)
-            if is_bottom:
-                filled = np.where(dry, -abs(filled), filled)
-                dry = filled <= 0.0
-            if step == 0:
-                land |= dry[0]
-            water[step, ..., component] = filled
+            block = _cut(layout.dataset[name], present, now).reshape(-1, *shape[1:])
+            for step, read in enumerate(layout.scales[component] * block, begin):
+                what = name if is_bottom else f'{name} at {time_text(axes.times[step])}'
+                _refuse_no_water(what, read, wanted[component], is_needed)
+                dry = ~np.isfinite(read)
+                filled = _fill_land(read)
+                if is_bottom:
+                    filled = np.where(dry, -abs(filled), filled)
+                    dry = filled <= 0.0
+                if step == 0:
+                    land |= dry[0]
+                water[step, ..., component] = filled
     return Loaded(axes, water, layout.standards, land)
 
 
