@@ -107,6 +107,7 @@ def test_notebook_runs_and_has_no_outputs(run_code, tmp_path):
     assert {run.score['status'] for run in names['runs'].values()} == {'completed'}
     assert [run.score['controller'] for run in names['runs'].values()] == ['adaptive', 'pid']
     assert (tmp_path / 'first_flight.html').exists()
+    assert names['depth'].yaxis_inverted()  # the surface is on top
 
 
 def script(*arguments: str) -> subprocess.CompletedProcess:
