@@ -612,6 +612,20 @@ def test_event_that_is_not_recorded_or_made_up_is_a_difference(altered, recorded
     ]
 
 
+def test_a_node_that_ended_in_a_tick_need_not_have_told_of_it(altered, recorded, tmp_path):
+    """Of a law that returns NaN nothing is published, nor what it would have told of that tick."""
+    events = [m for m in recorded if m.topic == '/diagnostics' and b'control_node' in m.data]
+    last = max(m.log_ns for m in events)
+    silent = {
+        '/diagnostics',
+        *(name for name in BLOCK_OF if BLOCK_OF[name] in ('control', 'guard')),
+    }
+    kept = [m for m in recorded if m.log_ns < last or m.log_ns == last and m.topic not in silent]
+    assert verified(altered(kept), tmp_path)['identical']
+    whole = [m for m in recorded if m.log_ns <= last and m not in events]
+    assert not verified(altered(whole), tmp_path)['identical']
+
+
 def test_stamps_alone_name_the_tick():
     stamps = np.arange(8) * TICK_NS
     for place in range(8):

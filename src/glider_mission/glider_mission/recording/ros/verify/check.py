@@ -94,6 +94,7 @@ class Check:
         self.flags = np.zeros((len(stamps_ns), len(block.block.flags)), np.int64)
         self.passed = np.ones(len(stamps_ns), np.int64)  #: ticks that pass in a step
         self.ticks = 0
+        self.heard = len(stamps_ns)  #: steps after which it may have ended before it told anything
         #: paths that guidance followed, one after the other, and from when (ns)
         self.paths = [(block.settings.path, 0)] if block.block.wired == wiring.GUIDANCE else []
         node = recording.node(block.block.wired.node)
@@ -230,7 +231,7 @@ class Check:
                 found = field_difference(array, event.raw)
                 self.add(Difference(at_ns, '/diagnostics', *found))
                 self.compared['/diagnostics'] += 1
-            else:
+            elif np.searchsorted(self.stamps_ns, at_ns) < self.heard:
                 self.add_whole(at_ns, '/diagnostics', repr(array.status[0].message))
         for event in rest:
             if is_ours(event) and event.stamp_ns <= end_ns:

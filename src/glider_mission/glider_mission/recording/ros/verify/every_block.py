@@ -84,6 +84,9 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
     if block.block is PLANT:  # publishes a tick before it needs the inputs of that tick
         count = min(count + 1, ticks)
     outputs = check.tracks(lambda one: by_tick(one, ticks), 'out of place or there twice')
+    heard = max((track.end for track in outputs.values()), default=ticks)
+    if heard + TICKS_OF_THE_END >= ticks:
+        check.heard = heard
     edges = {0, count, *range(0, count, _TICKS_AT_ONCE), *check.cuts(count)}
     for start, end in itertools.pairwise(sorted(edges)):
         check.follow_orders(start)
