@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from glider_base.kernel import PACKAGES
+from glider_base.kernels.cache import PACKAGES
 from glider_base.wiring import PORTS
 
 SOURCES = Path(__file__).resolve().parents[1] / 'src'

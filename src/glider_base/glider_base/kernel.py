@@ -15,14 +15,8 @@ from numba.core import event
 from numba.extending import overload
 
 from glider_base.kernels import compiler
-from glider_base.kernels.cache import KernelCache, is_kept
+from glider_base.kernels.cache import PACKAGES, KernelCache, is_kept
 from glider_base.plugins import registered, sources
-
-#: Packages whose kernels call each other.
-PACKAGES = (
-    *('glider_base', 'glider_model', 'glider_navigation', 'glider_guidance', 'glider_control'),
-    *('glider_guard', 'glider_mission', 'glider_bringup', 'glider_studies', 'glider_flights'),
-)
 
 Values = TypeVar('Values', bound=NamedTuple)
 

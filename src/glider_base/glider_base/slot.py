@@ -27,7 +27,7 @@ from numba.extending import is_jitted, overload
 
 from glider_base.errors import ConfigurationError, said_by, shown
 from glider_base.kernel import INLINED, kernel
-from glider_base.kernels.cache import BODIES, Body
+from glider_base.kernels.cache import BODIES, HOLDERS, Body
 
 #: What numba raises for a function that it cannot compile.
 NOT_COMPILED = (NumbaError, UnsupportedBytecodeError)
@@ -72,6 +72,7 @@ def slot(stub: Callable) -> Callable:
                     f'run the cell of {params_type.__name__} anew, too)'
                 )
             bodies[params_type] = function if is_jitted(function) else kernel(function)
+            HOLDERS.update(one.__module__.partition('.')[0] for one in (params_type, function))
             BODIES.append(Body(stub.__module__, params_type.__module__, function.__module__))
             return function
 

@@ -215,6 +215,45 @@ def test_a_change_compiles_what_it_reaches_and_nothing_else(package):
     assert package.call('here') == [(4.0, 0), (6.0, 0), (0.0, 0), (6.0, 0)]
 
 
+#: A number of a file that is no Python.
+READ = """
+from pathlib import Path
+FACTOR = float(Path(__file__).with_name('number.py').read_text())
+"""
+
+
+@pytest.mark.parametrize(
+    'line',
+    [
+        'from .factor import FACTOR',
+        'from . import factor; FACTOR = factor.FACTOR',
+        'from parts import \\\n    factor\nFACTOR = factor.FACTOR',
+        'try: from parts.factor import FACTOR\nexcept ImportError: FACTOR = 0.0',
+        READ,
+    ],
+)
+def test_a_change_is_compiled_however_it_is_imported_or_read(package, line):
+    laws = PARTS['laws'].replace('from parts.factor import FACTOR', line)
+    package.write('here', laws=laws, number='3.0')
+    assert package.call('here') == [(4.0, 1), (6.0, 1), (0.0, 1), (6.0, 1)]
+    assert package.call('here') == [(4.0, 0), (6.0, 0), (0.0, 0), (6.0, 0)]
+    package.write('here', laws=laws, factor='FACTOR = 4.0\n', number='4.0')
+    assert package.call('here') == [(4.0, 0), (8.0, 1), (0.0, 0), (8.0, 1)]
+
+
+def test_an_installed_law_that_numba_alone_compiles_is_compiled_anew_when_it_changes(
+    package, tmp_path
+):
+    laws = PARTS['laws'].replace('from parts.hole', 'from hole').replace('@kernel', '@numba.njit')
+    laws = laws.replace('from glider_base.kernel import kernel', 'import numba')
+    call = 'from hole import flown\nfrom parts.laws import Params\n'
+    call += 'print(flown(1.0, Params(2.0)), sum(flown.stats.cache_misses.values()))'
+    for factor, misses in ((3.0, 1), (3.0, 0), (4.0, 1)):
+        package.write('site-packages', laws=laws, factor=f'FACTOR = {factor}\n')
+        (tmp_path / 'site-packages' / 'hole.py').write_text(PARTS['hole'])
+        assert package.call('site-packages', call) == [(2.0 * factor, misses)]
+
+
 def test_another_checkout_finds_what_is_there(package):
     package.write('here')
     package.write('there')

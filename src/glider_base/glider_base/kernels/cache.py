@@ -20,9 +20,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
+import numpy as np
 from numba.core import types
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
@@ -31,10 +32,16 @@ from numba.core.serialize import dumps
 
 from glider_base.kernels.compiler import OPTIONS
 
+#: Our own packages, whose kernels call each other.
+PACKAGES = (
+    *('glider_base', 'glider_model', 'glider_navigation', 'glider_guidance', 'glider_control'),
+    *('glider_guard', 'glider_mission', 'glider_bringup', 'glider_studies', 'glider_flights'),
+)
 #: What is kept at most (bytes), and how old it was before it is marked as used again (s).
 LARGEST, USED_S = 2_000_000_000, 86_400.0
+#: Imports wherever they stand in a line; also what reads like one in a text, which does no harm.
 _IMPORT = re.compile(
-    r'^[ \t]*(?:from[ \t]+([\w.]+)[ \t]+import[ \t]+(\([^)]*\)|[^\n]*)|import[ \t]+([^\n]*))', re.M
+    r'from[ \t]*([\w.]+)[ \t]+import\b[ \t]*(\([^)]*\)|[^\n;]*)|import[ \t]+([^\n;]*)'
 )
 #: Where packages of others are installed. Only what holds kernels is looked at there.
 _INSTALLED = (f'{os.sep}site-packages{os.sep}', f'{os.sep}dist-packages{os.sep}')
@@ -91,10 +98,15 @@ def _counts(module: str) -> bool:
 @cache
 def _source(module: str) -> tuple[bytes, frozenset[str]]:
     """Digest of a module, and the modules that it imports."""
-    data = Path(_file_of(module)).read_bytes()
+    path = _file_of(module)
+    data = Path(path).read_bytes()
+    package = module if path.endswith('__init__.py') else module.rpartition('.')[0]
     names = set()
-    for origin, members, plain in _IMPORT.findall(data.decode('utf-8', 'replace')):
+    text = data.decode('utf-8', 'replace').replace('\\\n', ' ')
+    for origin, members, plain in _IMPORT.findall(text):
         if origin:
+            with suppress(ImportError):  # it leads out of the package, and nothing imports it
+                origin = importlib.util.resolve_name(origin, package)
             names.add(origin)
             names |= {f'{origin}.{one}' for one in re.findall(r'\w+', members)}
         names |= {part.split()[0] for part in plain.split(',') if part.strip()}
@@ -134,7 +146,21 @@ def closure(modules: frozenset[str], bodies: int, kernels: int) -> str | None:
     digest = hashlib.sha256(numba.__version__.encode())
     for module in sorted(seen):
         digest.update(module.encode() + b'\0' + seen[module])
+        if module.partition('.')[0] not in PACKAGES:
+            for name, value in sorted(vars(sys.modules.get(module, object)).items()):
+                digest.update(b''.join(_held(name, value)))
     return digest.hexdigest()[:16]
+
+
+def _held(name: str, value: Any) -> Iterator[bytes]:
+    """Numbers of a module, as a kernel holds them: wherever they were read from."""
+    if isinstance(value, tuple):
+        for number, one in enumerate(value):
+            yield from _held(f'{name}.{number}', one)
+    elif isinstance(value, int | float | complex | np.generic | np.ndarray):
+        array = np.asarray(value)
+        if not array.dtype.hasobject:
+            yield f'{name} {array.dtype.str} {array.shape} '.encode() + array.tobytes()
 
 
 def _classes(kinds: Iterable) -> Iterator[type]:

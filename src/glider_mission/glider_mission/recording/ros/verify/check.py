@@ -94,7 +94,7 @@ class Check:
         self.flags = np.zeros((len(stamps_ns), len(block.block.flags)), np.int64)
         self.passed = np.ones(len(stamps_ns), np.int64)  #: ticks that pass in a step
         self.ticks = 0
-        self.heard = len(stamps_ns)  #: steps after which it may have ended before it told anything
+        self.heard = len(stamps_ns)  #: steps after which it may have ended before it reported
         #: paths that guidance followed, one after the other, and from when (ns)
         self.paths = [(block.settings.path, 0)] if block.block.wired == wiring.GUIDANCE else []
         node = recording.node(block.block.wired.node)
