@@ -37,14 +37,17 @@ TOLD = 'GLIDER_TOLD'
 ClassT = TypeVar('ClassT', bound=type)
 
 
+#: All entry points, which are read once.
+_installed = cache(entry_points)
+
+
 @cache
 def registered() -> tuple[EntryPoint, ...]:
     """Entry points of all groups, in the order of group and name."""
-    everything = entry_points()
     found = {
         (point.group, point.name, point.value): point
         for group in GROUPS
-        for point in everything.select(group=group)
+        for point in _installed().select(group=group)
     }
     return tuple(found[key] for key in sorted(found))
 
@@ -116,7 +119,7 @@ def sections(found: dict[str, ClassT]) -> dict[str, tuple]:
 def offered(group: str) -> dict[str, EntryPoint]:
     """What is registered in a group, by name, not loaded; of one name that of the stack."""
     found = {}
-    points = entry_points(group=group)
+    points = _installed().select(group=group)
     for point in sorted(points, key=lambda one: (not one.module.startswith('glider_'), one.value)):
         if (first := found.setdefault(point.name, point)).value != point.value:
             _tell(point, f'ValueError: its name is taken by {_origin(first)}')
