@@ -307,6 +307,12 @@ def bent(data):
     return flat.assign_coords(nav_lat=(('y', 'x'), across, {'units': 'degrees_north'}))
 
 
+def called(data, **standards):
+    """The same with axes that have such standard names."""
+    named = {name: data[name].assign_attrs(standard_name=one) for name, one in standards.items()}
+    return data.assign_coords(named)
+
+
 @pytest.mark.parametrize(
     ('change', 'text'),
     [
@@ -319,6 +325,8 @@ def bent(data):
         (lambda one: one.assign(uo=one.uo.assign_attrs(units='knots')), "uo: units = 'knots'"),
         (lambda one: one.isel(latitude=[0, 2, 1]), 'latitude: neither increases nor decreases'),
         (lambda one: one.isel(longitude=0), 'uo: no axis of longitude'),
+        (lambda one: called(one, latitude='grid_latitude'), 'latitude is no axis; a rotated grid'),
+        (lambda one: called(one, depth='ocean_s_coordinate_g1'), 'levels that follow the bottom'),
         (lambda one: one.assign_coords(depth=one.depth.assign_attrs(positive='up')),
          'depth: positive up, and no level below the surface'),
     ],

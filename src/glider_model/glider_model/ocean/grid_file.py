@@ -93,9 +93,9 @@ GRIDS = {'currents': VELOCITIES, 'water': TEMPERATURE_AND_SALINITY, 'bottom': BO
 #: What of a grid no regular axes have, by names of dimensions or coordinates: what it is called.
 _OTHER_GRIDS = {
     's_rho': 'levels that follow the bottom, as ROMS and CROCO have',
-    'sigma': 'levels that follow the bottom',
+    **dict.fromkeys(('sigma', 'ocean_s_coordinate'), 'levels that follow the bottom'),
     'projection_x_coordinate': 'a projected grid, as polar models have',
-    'rlon': 'a rotated grid',
+    **dict.fromkeys(('rlon', 'grid_latitude', 'grid_longitude'), 'a rotated grid'),
     'node': 'a mesh of triangles',
     'face': 'a mesh',
 }
