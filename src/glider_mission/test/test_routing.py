@@ -10,6 +10,7 @@ import pytest
 from glider_base.errors import ConfigurationError
 from glider_guidance.yo.stage import AT_END_OF_PATH, WAITING_ON_SURFACE
 from glider_mission.blocks import COLUMNS, ROW
+from glider_mission.routing import forecast_chart
 from glider_mission.routing import pilot as piloting
 from glider_mission.routing.forecast_chart import (
     erroneous,
@@ -418,3 +419,12 @@ def test_a_made_sea_is_as_strong_as_it_was_asked_to_be_and_loses_no_water():
     spread += np.gradient(north[0, 0], axes['latitude'] * degree_m, axis=0)
     turning = np.gradient(north[0, 0], axes['longitude'] * degree_m * shrunk, axis=1)
     assert np.abs(spread[1:-1, 1:-1]).max() < 0.35 * np.abs(turning).max()
+
+
+def test_a_current_of_somebody_that_raises_is_told_in_a_line(monkeypatch):
+    def raises(*arguments):
+        raise ValueError('the sea is over')
+
+    monkeypatch.setattr(forecast_chart, '_depth_means', raises)
+    with pytest.raises(ConfigurationError, match=r'^current.field: raises \(.*: the sea'):
+        forecast_of(load_scenario('survey'), 0.1)

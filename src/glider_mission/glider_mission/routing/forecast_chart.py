@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from glider_base.errors import ConfigurationError
 from glider_base.frames import from_geodetic
 from glider_base.kernel import kernel
 from glider_base.linear import solve
 from glider_base.noise import random_stream
-from glider_base.signals import TICK_S
+from glider_base.signals import TICK_S, raised
+from glider_base.slot import NOT_COMPILED
 from glider_mission.routing.fronts import Chart, current_on
 from glider_mission.scenario import Scenario, check_starts, named_in
 from glider_model.ocean.bottom import bottom_depth
@@ -100,7 +102,12 @@ def forecast_of(scenario: Scenario, stay: float) -> Forecast:
     means, at_top = np.empty((2, len(times), len(norths), len(easts), 2), dtype=np.float32)
     nothing = np.zeros(0)
     for levels, found in ((depths, means), (np.zeros(1), at_top)):
-        _depth_means(params, nothing, times - late_s, norths, easts, levels, found)
+        try:
+            _depth_means(params, nothing, times - late_s, norths, easts, levels, found)
+        except (ConfigurationError, *NOT_COMPILED):
+            raise
+        except Exception as error:  # of a field of somebody's own
+            raise ConfigurationError(f'current.field: {raised(error)}') from error
     stays = stay * (at_top + np.float32(scenario.water.wind_drift()) - means)
     chart = Chart(times, norths, easts, means)
     land = np.zeros(means.shape[1:3], dtype=bool)
