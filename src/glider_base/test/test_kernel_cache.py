@@ -261,6 +261,41 @@ def test_another_checkout_finds_what_is_there(package):
     assert package.call('there') == [(4.0, 0), (6.0, 0), (0.0, 0), (6.0, 0)]
 
 
+#: Three functions of one name, which differ in a number alone.
+TWINS = """
+from glider_base.kernel import kernel
+
+def made(gain):
+    @kernel
+    def times(x):
+        return gain * x
+    return times
+
+@kernel
+def plus(x):
+    return x + 1.0
+
+both = plus, made(2.0), made(3.0)
+
+@kernel
+def plus(x):
+    return x + 5.0
+"""
+ASK_TWINS = """
+from parts.other import both, plus
+
+for one in (*both, plus):
+    print(one(1.0), sum(one.stats.cache_misses.values()))
+"""
+
+
+def test_functions_of_one_name_are_told_apart(package):
+    package.write('here', other=TWINS)
+    for misses in (1, 0):
+        wanted = [(number, misses) for number in (2.0, 2.0, 3.0, 6.0)]
+        assert package.call('here', ASK_TWINS) == wanted
+
+
 #: An edit while a program runs: told of before and after it is imported.
 EDITED = """
 import importlib

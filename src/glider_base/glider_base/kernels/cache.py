@@ -223,10 +223,11 @@ class KernelCache(NullCache):
         digest = closure(frozenset(modules), len(BODIES), KernelCache.made)
         if digest is None:
             return None
-        cells = dumps([cell.cell_contents for cell in own.__closure__ or ()])
+        code, cells = own.__code__, [cell.cell_contents for cell in own.__closure__ or ()]
         names = sorted({f'{one.__module__}.{one.__qualname__}' for one in classes})
-        told = [kind.name for kind in kinds], names, own.__code__.co_code, cells
+        told = [kind.name for kind in kinds], names, code.co_firstlineno, code.co_code
         told = repr((sys.implementation.cache_tag, codegen.magic_tuple(), *told))
+        told += repr(dumps(cells)) if cells else ''
         which = hashlib.sha256(told.encode()).hexdigest()[:16]
         return Path(self.cache_path, f'{own.__qualname__}{self._ending}.{digest}.{which}')
 
