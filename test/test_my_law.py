@@ -182,7 +182,8 @@ class Machine:
 
     def compiled(self) -> dict[Path, int]:
         """Files of compiled code, and when each was written."""
-        return {path: path.stat().st_mtime_ns for path in self.cache.rglob('*.nb?')}
+        kept = (path for path in (self.cache / 'kernels').rglob('*') if path.is_file())
+        return {path: path.stat().st_mtime_ns for path in kept}
 
 
 def values(field: str, *numbers: float) -> dict:
