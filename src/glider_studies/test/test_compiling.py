@@ -28,7 +28,7 @@ def flown(monkeypatch):
     """
     loops = []
 
-    def fly_nothing(blocks, log, dt):
+    def fly_nothing(blocks, log, halts, dt):
         kinds = (block.field_dict.values() for block in numba.typeof(blocks).field_dict.values())
         loops.append((tuple(map(tuple, kinds)), len(log)))
         return 0, False
