@@ -206,6 +206,8 @@ def link(source: str, target: str) -> None:
     """Have a file in two places, if they are of one disk: it is replaced, never changed."""
     try:
         os.link(source, target)
+    except FileNotFoundError:
+        pass  # another worker was writing it
     except OSError:
         shutil.copy2(source, target)
 
