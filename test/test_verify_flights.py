@@ -354,6 +354,24 @@ def test_hole_in_such_a_recording_is_named_beside_the_difference(glider, free_fl
         assert first_s < blocks[name]['first']['t_s'] < last_s + 0.1
 
 
+def test_a_recorder_that_came_late_is_no_difference(glider, free_flight, monkeypatch):
+    """On a busy machine it hears of one node seconds after another."""
+    put, missed = Vehicle.put, []
+
+    def late(vehicle, name, raw) -> None:
+        if name == 'joint_states' and len(missed) < 20:
+            missed.append(raw)
+        else:
+            put(vehicle, name, raw)
+
+    monkeypatch.setattr(Vehicle, 'put', late)
+    code, blocks = verified(glider, free_flight())
+    assert (code, blocks['guidance']['result'], blocks['control']['result']) == (
+        *(0, 'identical', 'skipped'),
+    )
+    assert 'joint_states is recorded from t = ' in blocks['control']['reason']
+
+
 def test_node_that_was_configured_again_is_named_beside_the_difference(glider, free_flight):
     """It is back at once: no topic is silent."""
 

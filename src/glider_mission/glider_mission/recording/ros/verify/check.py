@@ -65,6 +65,13 @@ class Verdict(NamedTuple):
     notes: Sequence[str] = ()
 
 
+def begun_before(block: str, name: str, series: Series) -> Verdict:
+    """Verdict on a block that had taken steps before an input of it is on record."""
+    since = health.seconds(int(series.stamps_ns[0]))
+    why = f'{name} is recorded from {since} on, not from its first step'
+    return Verdict(block, SKIPPED, f'its state is not known: {why}')
+
+
 class Track:
     """Which message of a topic belongs to each step of a block; -1 where there is none."""
 

@@ -31,6 +31,7 @@ from glider_mission.recording.ros.verify.check import (
     Check,
     Track,
     Verdict,
+    begun_before,
 )
 from glider_mission.recording.ros.verify.free_running import free_running
 from glider_model.plant.block import PLANT
@@ -76,9 +77,7 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
     inputs = {name: by_tick(series[name], ticks)[0] for name in block.inputs}
     late = [name for name, track in inputs.items() if track.index[0] < 0]
     if late:
-        first_ns = int(series[late[0]].stamps_ns[0])
-        why = f'{late[0]} is recorded from {seconds(first_ns)} on, not from the first tick'
-        return Verdict(wired.name, SKIPPED, f'its state is not known: {why}')
+        return begun_before(wired.name, late[0], series[late[0]])
     check = Check(block, recording, np.arange(ticks, dtype=np.int64) * TICK_NS)
     count = min(track.gap for track in inputs.values())
     if block.block is PLANT:  # publishes a tick before it needs the inputs of that tick

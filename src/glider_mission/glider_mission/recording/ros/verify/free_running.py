@@ -14,7 +14,13 @@ from glider_base.ros.lockstep.step_node import Passing
 from glider_base.signals import TICK_S
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.recorded_run import Recording, Series
-from glider_mission.recording.ros.verify.check import TICKS_OF_THE_END, Check, Track, Verdict
+from glider_mission.recording.ros.verify.check import (
+    TICKS_OF_THE_END,
+    Check,
+    Track,
+    Verdict,
+    begun_before,
+)
 
 #: A step has the newest message of an input, or one that is so many older.
 _OLDER = range(4)
@@ -65,6 +71,9 @@ def free_running(
     # what is published first is published while an input is stale, too
     marker = next(name for name in reversed(wired.outputs) if name in series)
     stamps_ns = series[marker].stamps_ns
+    for name in block.inputs:
+        if series[name].stamps_ns[0] > stamps_ns[0]:
+            return begun_before(wired.name, name, series[name])
     check = Check(block, recording, stamps_ns)
     passing = Passing(max_age_s)
     check.passed[:] = [passing.ticks(int(stamp_ns)) for stamp_ns in stamps_ns]
