@@ -3,14 +3,15 @@
 """Routes: fronts against closed forms, plans of the shipped seas, and what a pilot orders."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from glider_base.errors import ConfigurationError
+from glider_base.kernel import kernel
 from glider_guidance.yo.stage import AT_END_OF_PATH, WAITING_ON_SURFACE
 from glider_mission.blocks import COLUMNS, ROW
-from glider_mission.routing import forecast_chart
 from glider_mission.routing import pilot as piloting
 from glider_mission.routing.forecast_chart import (
     erroneous,
@@ -31,6 +32,7 @@ from glider_mission.routing.plan import (
 )
 from glider_mission.scenario import SCENARIO_FOLDER, load_scenario
 from glider_model.ocean.eddying_sea import EddyingSea, currents, write_sea
+from glider_model.ocean.field import FieldSettings, field_velocity
 from glider_model.ocean.grid_file import load
 
 END_S = 1e9
@@ -421,10 +423,36 @@ def test_a_made_sea_is_as_strong_as_it_was_asked_to_be_and_loses_no_water():
     assert np.abs(spread[1:-1, 1:-1]).max() < 0.35 * np.abs(turning).max()
 
 
-def test_a_current_of_somebody_that_raises_is_told_in_a_line(monkeypatch):
-    def raises(*arguments):
-        raise ValueError('the sea is over')
+class Ending(FieldSettings):
+    """A current of somebody's own that is not there behind its last hour."""
 
-    monkeypatch.setattr(forecast_chart, '_depth_means', raises)
-    with pytest.raises(ConfigurationError, match=r'^current.field: raises \(.*: the sea'):
-        forecast_of(load_scenario('survey'), 0.1)
+    kind: str = 'ending'
+    last_s: float = 3600.0
+
+    def params(self) -> 'EndingParams':
+        return EndingParams(self.last_s)
+
+
+class EndingParams(NamedTuple):
+    last: float
+
+
+@field_velocity.body(EndingParams)
+@kernel
+def ending_velocity(position, t_s, params):
+    if t_s > params.last:
+        raise ValueError('the sea is over')
+    return 0.1, 0.0, 0.0
+
+
+def test_a_current_of_somebody_that_raises_is_told_in_a_line():
+    survey = load_scenario('survey', {'current.speed_kn': 0.0})
+
+    def by(**fields):
+        field = survey.current.model_copy(update={'field': Ending(**fields)})
+        return forecast_of(survey.model_copy(update={'current': field}), 0.1)
+
+    np.testing.assert_allclose(by(last_s=1e9).chart.current[..., 0], 0.1, rtol=1e-6)
+    who = r'^current.field: ending_velocity \(.*\): ValueError: the sea is over'
+    with pytest.raises(ConfigurationError, match=who):
+        by()

@@ -379,8 +379,9 @@ def plan(scenario: Scenario, progress: Callable[[int], None] = lambda done: None
     if not made.reachable and math.isfinite(straight_s):
         route = route._replace(corners=waypoints, ends=[*range(1, len(waypoints))])
         made = made._replace(route=route)
+    arrives = made.reachable
     for sea in with_errors(chart, scenario.forecast.error_mps, scenario):
-        s = sailed_s(sea, route.corners, 0.0, pace.speed, end_s) if made.reachable else math.inf
+        s = sailed_s(sea, route.corners, 0.0, pace.speed, end_s) if arrives else math.inf
         arrivals.append(s)
         progress(len(arrivals) + 1)
     return made._replace(arrivals_s=np.array(arrivals))
