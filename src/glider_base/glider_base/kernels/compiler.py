@@ -2,8 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What numba does for kernels in vain, and is spared here (docs/adr/0009).
 
-That is machine code of kernels that others inline, counts of references in tuples that have none,
-and passes over loops in what has been inlined. All of it stands on what is not public in numba.
+That is machine code of kernels that others inline, bitcode of those that nobody inlines, counts of
+references in tuples that have none, and passes over loops in what has been inlined. All of it
+stands on what is not public in numba.
 With any other numba than the one that it was written for, kernels are compiled as numba does it.
 With any of them, Python looks for no garbage while something is compiled.
 """
