@@ -4,15 +4,17 @@
 
 import gc
 import os
+import random
 import subprocess
 import sys
 from typing import NamedTuple
 
 import numba
+import numpy as np
 import pytest
-from numba.core import event, types
+from numba.core import errors, event, types
 
-from glider_base.kernel import on_compiling
+from glider_base.kernel import kernel, on_compiling
 
 
 class Inner(NamedTuple):
@@ -130,3 +132,25 @@ def test_what_is_inlined_prints_and_raises_as_it_would_alone(tmp_path):
         ['inner 3.0 of two', '7.0', "('below zero', -1.0)"]
     ] * 2
     assert [lines[-1] for lines in said] == ['0', '1']
+
+
+@kernel
+def noisy(x):
+    return x + np.random.normal()
+
+
+@numba.njit
+def unlike(x):
+    return x + random.random()
+
+
+@pytest.mark.parametrize('own', [noisy, unlike])
+def test_what_draws_random_numbers_is_refused_for_it_is_never_flown_again(own):
+    """Of numpy or of Python, in a kernel or in what it calls."""
+
+    @kernel
+    def outer(x):
+        return 2.0 * own(x)
+
+    with pytest.raises(errors.NumbaError, match='draws random numbers'):
+        outer(1.0)

@@ -428,24 +428,26 @@ class Ending(FieldSettings):
 
     kind: str = 'ending'
     last_s: float = 3600.0
+    raises: bool = True
 
     def params(self) -> 'EndingParams':
-        return EndingParams(self.last_s)
+        return EndingParams(self.last_s, self.raises)
 
 
 class EndingParams(NamedTuple):
     last: float
+    raises: bool
 
 
 @field_velocity.body(EndingParams)
 @kernel
 def ending_velocity(position, t_s, params):
-    if t_s > params.last:
+    if t_s > params.last and params.raises:
         raise ValueError('the sea is over')
-    return 0.1, 0.0, 0.0
+    return 0.1 if t_s <= params.last else math.nan, 0.0, 0.0
 
 
-def test_a_current_of_somebody_that_raises_is_told_in_a_line():
+def test_a_current_of_somebody_that_raises_or_is_no_number_is_told_in_a_line():
     survey = load_scenario('survey', {'current.speed_kn': 0.0})
 
     def by(**fields):
@@ -456,3 +458,5 @@ def test_a_current_of_somebody_that_raises_is_told_in_a_line():
     who = r'^current.field: ending_velocity \(.*\): ValueError: the sea is over'
     with pytest.raises(ConfigurationError, match=who):
         by()
+    with pytest.raises(ConfigurationError, match='field: nan m/s after 10,800 s at north -60,000'):
+        by(raises=False)

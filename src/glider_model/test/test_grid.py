@@ -229,6 +229,7 @@ def test_what_is_beyond_the_valid_numbers_of_a_variable_is_missing(told, packed,
         {'units': 'days since 2026-01-01', 'calendar': '360_day'},
         {'units': 'days since 0001-01-01', 'calendar': 'standard'},
         {'units': 'moons since 2026-01-01'},
+        {'units': 'days since 2026-01-01', 'calendar': 7},
     ],
 )
 def test_times_of_another_calendar_are_refused(told, tmp_path):
@@ -259,6 +260,16 @@ def test_land_is_told_and_has_the_water_beside_it(tmp_path):
     assert interpolate(0.0, 900.0, 36.0, 122.0, params) == pytest.approx(above)
     with pytest.raises(ValueError, match=r'36.0000, 120.3000 on the path is land'):
         grid(path, (36.0, 120.3))
+
+
+def test_a_level_without_water_has_that_of_the_one_beside_it(tmp_path):
+    """The one above it; of the uppermost there is only that below."""
+    data = dataset()
+    wet = (data.depth > DEPTHS[0]) & (data.depth != DEPTHS[3])
+    water = load(written(data.where(wet | (data.time != data.time[2])), tmp_path / 'sea.nc')).water
+    whole = load(written(data, tmp_path / 'whole.nc')).water
+    assert water[2] == pytest.approx(whole[2][[1, 1, 2, 2, *range(4, len(DEPTHS))]])
+    assert (water[[0, 1, 3]] == whole[[0, 1, 3]]).all()
 
 
 @pytest.mark.parametrize(
@@ -329,6 +340,7 @@ def called(data, **standards):
         (lambda one: called(one, depth='ocean_s_coordinate_g1'), 'levels that follow the bottom'),
         (lambda one: one.assign_coords(depth=one.depth.assign_attrs(positive='up')),
          'depth: positive up, and no level below the surface'),
+        (lambda one: one.assign(uo=one.uo.assign_attrs(scale_factor='0.01 m/s')), 'uo: scale_fac'),
     ],
 )  # fmt: skip
 def test_what_is_no_regular_grid_is_refused_by_name(change, text, tmp_path):

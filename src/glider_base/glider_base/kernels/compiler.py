@@ -12,7 +12,7 @@ With any of them, Python looks for no garbage while something is compiled.
 import gc
 
 import numba
-from numba.core import event
+from numba.core import errors, event
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen, ll
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
@@ -26,6 +26,8 @@ WRITTEN_FOR = '0.61.'
 _BITCODE, _MACHINE_CODE = 'inlined', 'called'
 #: How names of environments of functions begin in a module.
 _ENVIRONMENT = '_ZN08NumbaEnv'
+#: What random numbers are drawn from: NumPy's, and Python's.
+_RANDOM = 'numba_get_np_random_state', 'numba_get_py_random_state'
 #: Code of so many basic blocks, as the tick of a block has, is large. Passes over it, by their
 #: names in llvmlite, are those of -O3, but none over loops.
 _LARGE = 500
@@ -126,6 +128,8 @@ class _Lowering(NativeLowering):
         library.is_kernel = True
         library.is_inlined = bool(flags.forceinline and flags.no_cpython_wrapper)
         changed = super().run_pass(state)
+        if any(one.name in _RANDOM for one in library._final_module.functions):
+            raise errors.UnsupportedError('it draws random numbers, and no run would be repeated')
         if not library.is_inlined:
             for name in (one.name for one in library._final_module.global_variables):
                 env = lookup_environment(name) if name.startswith(_ENVIRONMENT) else None

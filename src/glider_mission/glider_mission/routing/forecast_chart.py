@@ -108,6 +108,12 @@ def forecast_of(scenario: Scenario, stay: float) -> Forecast:
             raise
         except Exception as error:  # of a field of somebody's own
             raise ConfigurationError(f'current.field: {raised(error)}') from error
+        if not np.isfinite(found).all():
+            t, i, j, k = np.argwhere(~np.isfinite(found))[0]
+            raise ConfigurationError(
+                f'current.field: {found[t, i, j, k]} m/s after {times[t]:,.0f} s at north '
+                f'{norths[i]:,.0f} m, east {easts[j]:,.0f} m (allowed: numbers)'
+            )
     stays = stay * (at_top + np.float32(scenario.water.wind_drift()) - means)
     chart = Chart(times, norths, easts, means)
     land = np.zeros(means.shape[1:3], dtype=bool)

@@ -290,7 +290,7 @@ def _times(variable: 'xarray.Variable') -> np.ndarray:
 
     units, calendar = variable.attrs.get('units'), variable.attrs.get('calendar')
     try:
-        values = decode_cf_datetime(variable.values, str(units), calendar)
+        values = decode_cf_datetime(variable.values, str(units), calendar and str(calendar))
     except (ValueError, ImportError, OverflowError):  # of other calendars, by a library for them
         values = np.empty(0)
     if values.dtype.kind != 'M':
@@ -349,6 +349,10 @@ def _layout(dataset: 'xarray.Dataset', wanted: tuple[Wanted, ...]) -> _Layout:
     scales = []
     for one, (name, standard) in zip(wanted, found, strict=True):
         attrs = dataset[name].attrs
+        for word in ('scale_factor', 'add_offset'):
+            packed = dataset[name].encoding.get(word, 0)
+            if np.asarray(packed).dtype.kind not in 'iuf':
+                raise ValueError(f'{name}: {word} = {packed!r} (allowed: a number)')
         points = attrs.get('positive', 'up' if standard in _HEIGHTS else 'down')
         usual = 'm' if wanted is BOTTOM else ''
         scales.append(scale_of(name, attrs, one.units, usual) * (-1.0 if points == 'up' else 1.0))
@@ -561,16 +565,21 @@ def _cut(part: 'xarray.DataArray', axes: dict[str, str], chosen: dict[str, np.nd
 
 
 def _fill_land(levels: np.ndarray) -> np.ndarray:
-    """The nearest water in place of land, level by level; below the bottom the water above it."""
+    """The nearest water in place of land, level by level; of a level without, that above it.
+
+    Above the first level that has water it is that of this one.
+    """
     from scipy.ndimage import distance_transform_edt
 
-    for level, values in enumerate(levels):
+    first = int(np.isfinite(levels).any(axis=(1, 2)).argmax())
+    for level, values in enumerate(levels[first:], first):
         dry = ~np.isfinite(values)
         if dry.all():
-            values[:] = levels[level - 1] if level else 0.0
+            values[:] = levels[level - 1] if level > first else 0.0
         elif dry.any():
             _, nearest = distance_transform_edt(dry, return_indices=True)
             values[:] = values[tuple(nearest)]
+    levels[:first] = levels[first]
     return levels
 
 
