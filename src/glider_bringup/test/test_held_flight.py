@@ -3,6 +3,7 @@
 """A flight in one's own hands: the bits of a flight at once, however it is cut up or carried."""
 
 import copy
+import json
 import math
 import pickle
 import re
@@ -16,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import glider_bringup as glider
 from glider_base.kernel import kernel
@@ -23,6 +25,7 @@ from glider_base.ros.lockstep import block_node
 from glider_base.ros.lockstep.block_node import BlockNode
 from glider_base.ros.lockstep.process import Stop
 from glider_base.signals import TICK_NS, TICK_S
+from glider_bringup.cli import app
 from glider_bringup.engines.direct import FlightError, HeldMission
 from glider_bringup.engines.flight import ended
 from glider_control.law import LawSettings, law_step
@@ -277,6 +280,42 @@ def test_a_law_that_fails_ends_it_at_one_tick_however_it_is_cut_up(raises):
         'current_8deg', {**fields, 'control.FailingLaw.at': at}, law=FailingLaw
     ).score
     assert (score['status'], score['reason'], score['ticks']) == ('failed', said, flight.tick)
+
+
+def test_a_law_that_raised_over_nodes_is_verified_up_to_there(read_bag, write_bag, tmp_path):
+    """There the inputs of its last tick are on record, and nothing that it would have said."""
+    fields, at = {'dives': 0, 'duration_s': 200.0, 'profile.prepare_s': 10.0}, 1500
+    flight = glider.Flight('current_8deg', fields, law=FailingLaw)
+    flight.step(at)
+    calls = flight.state.kept.mission.control.law.times
+    folder = tmp_path / 'run'
+    glider.fly('current_8deg', fields, law=FailingLaw, out=folder, bag=True)
+    (file,) = folder.glob('*.mcap')
+    silent = {f'/glider/{name}' for name in ('demand', 'wrench', 'adaptation', 'command')}
+    heard = [m for m in read_bag(file) if m.log_ns <= at * TICK_NS]
+    kept = [m for m in heard if m.log_ns < at * TICK_NS or m.topic not in silent]
+    cut, tried = tmp_path / 'cut', tmp_path / 'cut' / 'tried.yaml'
+    cut.mkdir()
+    write_bag(cut / 'bag_0.mcap', file, kept)
+    text = (folder / 'scenario.yaml').read_text()
+    for name in ('scenario.yaml', 'vehicle.yaml'):
+        (cut / name).write_text((folder / name).read_text())
+
+    def control(calls):
+        """What is said of it by a law that raises after so many."""
+        fails = text.replace('at: 1000000\n    raises: false', f'at: {calls}\n    raises: true')
+        tried.write_text(fails)
+        line = ('verify', str(cut), '--settings', str(tried), '--only', 'control', '--json')
+        done = CliRunner().invoke(app, line)
+        assert done.stdout, done.output
+        (one,) = json.loads(done.stdout)['blocks']
+        return one
+
+    same = control(calls)
+    assert (same['result'], same['ticks']) == ('identical', at)
+    (said,) = same['notes']
+    assert re.match(RAISED + f' {at} .*, where its record ends', said), said
+    assert control(calls - 1)['result'] == 'different'
 
 
 def test_a_law_that_raises_on_a_planned_route_ends_it_at_that_tick():

@@ -15,7 +15,7 @@ import numpy as np
 from glider_base import wiring
 from glider_base.block import optional_topics
 from glider_base.ros.lockstep.health import seconds
-from glider_base.signals import TICK_NS, raised
+from glider_base.signals import TICK_NS, at_tick, raised
 from glider_base.wiring import WHEN_SILENT, WIRING, Wired, present, publisher
 from glider_mission.blocks import BLOCKS
 from glider_mission.recording.mcap_reader import Bag
@@ -86,11 +86,18 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
     heard = max((track.end for track in outputs.values()), default=ticks)
     if heard + TICKS_OF_THE_END >= ticks:
         check.heard = heard
-    edges = {0, count, *range(0, count, _TICKS_AT_ONCE), *check.cuts(count)}
-    for start, end in itertools.pairwise(sorted(edges)):
+    ended, edges = '', {0, count, min(count, check.heard), *range(0, count, _TICKS_AT_ONCE)}
+    for start, end in itertools.pairwise(sorted(edges | {*check.cuts(count)})):
         check.follow_orders(start)
         rows = {name: track.index[start : min(end, track.gap)] for name, track in inputs.items()}
-        for name, values in check.run(start, end, rows).items():
+        try:
+            computed = check.run(start, end, rows)
+        except Exception as error:  # of a law of somebody's own
+            if start < check.heard:
+                raise
+            ended = f'{at_tick(raised(error), start)}, where its record ends'
+            break
+        for name, values in computed.items():
             if name in outputs:
                 check.compare(name, outputs[name], start, values)
         progress(end / count)
@@ -101,7 +108,7 @@ def in_lockstep(block: RecordedBlock, recording: Recording, progress) -> Verdict
             check.add_whole(check.stamps_ns[track.gap], name, wanted, reason)
     behind = ticks - check.ticks
     if behind and not check.found:
-        check.notes.append(f'the inputs of the last {behind} ticks are not complete')
+        check.notes.append(ended or f'the inputs of the last {behind} ticks are not complete')
     if check.ticks:
         check.finish_events()
     return check.verdict()
