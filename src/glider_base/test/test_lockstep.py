@@ -669,19 +669,27 @@ def test_a_free_running_message_that_is_none_is_named_by_its_topic():
             item.accept_newest(raw, 0.0, 1.0)
 
 
-def test_parameter_that_there_is_not_is_refused_by_its_name(make_graph, context):
+@pytest.mark.parametrize(
+    ('one', 'why'),
+    [
+        (Parameter('nonsense', value=1.0), 'control_node: parameter nonsense: unknown (allowed: '),
+        (Parameter('use_sim_time', value=True), 'use_sim_time: a node goes by one clock '),
+    ],
+)
+def test_parameter_that_cannot_be_set_in_flight_is_refused_by_its_name(
+    make_graph, context, one, why
+):
     graph = make_graph(lockstep=False)
     client_node = rclpy.create_node('client', namespace='/glider', context=context)
     graph.nodes.append(client_node)
     graph.executor.add_node(client_node)
     client = client_node.create_client(SetParameters, f'{CONTROL}/set_parameters')
     assert graph.spin(client.service_is_ready) is None
-    one = Parameter('nonsense', value=1.0).to_parameter_msg()
-    future = client.call_async(SetParameters.Request(parameters=[one]))
+    future = client.call_async(SetParameters.Request(parameters=[one.to_parameter_msg()]))
     assert graph.spin(future.done) is None
     (result,) = future.result().results
     assert not result.successful
-    assert result.reason.startswith('control_node: parameter nonsense: unknown (allowed: ')
+    assert result.reason.startswith(why)
 
 
 def test_parameter_of_a_type_that_there_is_not_ends_no_node(make_graph, context):

@@ -114,11 +114,15 @@ class TickNode(Node):
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters at run time; one that there is not is refused by its name.
 
-        rclpy refuses it too, and says ``undeclared parameter(s): []``.
+        rclpy refuses it too, and says ``undeclared parameter(s): []``. It would take use_sim_time,
+        by which only a node that starts chooses its clock.
         """
-        unknown = unknown_parameters(self, [parameter.name for parameter in parameter_list])
-        if unknown:
-            return SetParametersResult(successful=False, reason=unknown)
+        names = [parameter.name for parameter in parameter_list]
+        reason = unknown_parameters(self, names)
+        if 'use_sim_time' in names:
+            reason = 'use_sim_time: a node goes by one clock from its start (allowed: no change)'
+        if reason:
+            return SetParametersResult(successful=False, reason=reason)
         return super().set_parameters_atomically(parameter_list)
 
     # ------------------------------------------------------------------ inputs and outputs
