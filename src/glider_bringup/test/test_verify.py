@@ -12,15 +12,18 @@ import sys
 import numpy as np
 import pytest
 import yaml
+from diagnostic_msgs.msg import DiagnosticArray
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
+from rclpy.serialization import deserialize_message
 from rosbags.typesys import Stores, get_typestore
 from typer.testing import CliRunner
 
 import glider_bringup as glider
 from glider_base import wiring
+from glider_base.ros.wire.codec import to_cdr
 from glider_base.ros.wire.topics import TOPICS, recorded_topics
 from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
@@ -34,6 +37,7 @@ from glider_mission.blocks import BLOCKS, COLUMNS, ROW
 from glider_mission.recording.mcap_reader import Bag
 from glider_mission.recording.recorded_inputs import RecordedBlock
 from glider_mission.recording.ros.node_settings import read_settings
+from glider_mission.recording.ros.recorded_log import RecordedLog
 from glider_mission.recording.ros.recorded_run import Recording, Series
 from glider_mission.recording.ros.verify import every_block
 from glider_mission.recording.ros.verify.check import IDENTICAL
@@ -610,6 +614,26 @@ def test_event_that_is_not_recorded_or_made_up_is_a_difference(altered, recorded
     assert [(one['topic'], one['recorded']) for one in firsts] == [
         ('/diagnostics', 'not computed')
     ]
+
+
+def test_what_nodes_repeat_of_themselves_is_no_event(altered, recorded, short_run, tmp_path):
+    """`ros2 bag record` keeps it, later than an event that was published after it."""
+    repeats = []
+    for message in (one for one in recorded if one.topic == '/diagnostics'):
+        array = deserialize_message(message.data, DiagnosticArray)
+        (status,) = array.status
+        told = len(status.values)
+        status.values = [pair for pair in status.values if pair.key != 't_s']
+        late = message._replace(log_ns=recorded[-1].log_ns, data=to_cdr(array))
+        repeats += [late] * (len(status.values) < told)
+    assert len(repeats) > 5
+    folder = altered([*recorded, *reversed(repeats)])
+    assert verified(folder, tmp_path)['identical']
+    rows, expected = (
+        np.concatenate([block.copy() for block in RecordedLog(Bag(path)).blocks()])
+        for path in (folder, short_run)
+    )
+    np.testing.assert_array_equal(rows, expected)
 
 
 def test_a_node_that_ended_in_a_tick_need_not_have_told_of_it(altered, recorded, tmp_path):

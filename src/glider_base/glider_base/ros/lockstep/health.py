@@ -37,6 +37,8 @@ ABORT, PARAMETERS_SET, SURFACE, CLEAR = 'abort', 'parameters set', 'surface', 'c
 CONFIGURED = 'configured: it knows nothing of before'
 
 _SECOND_NS = 1_000_000_000
+#: Key that an event of a block has, and what is repeated beside it has not.
+EVENT = 't_s'
 #: The stamp of a message with a header, after the 4 bytes that say how it is encoded.
 _STAMP, _STAMP_AT = struct.Struct('<iI'), 4
 
@@ -70,7 +72,7 @@ def status_array(stamp_ns: int, name: str, level: bytes, message: str, values: d
 
 def said_array(stamp_ns: int, node: str, said: Said) -> DiagnosticArray:
     """Event of a block at a tick; ``node`` is the full name of the node that tells it."""
-    values = {**said.values, 't_s': stamp_ns / 1e9}
+    values = {**said.values, EVENT: stamp_ns / 1e9}
     return status_array(stamp_ns, node, LEVELS[said.level], said.message, values)
 
 

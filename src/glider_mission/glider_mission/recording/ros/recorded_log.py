@@ -167,6 +167,8 @@ class RecordedLog:
             tick = health.stamp_of(array) // TICK_NS
             for status in array.status:
                 values = {pair.key: pair.value for pair in status.values}
+                if health.EVENT not in values:  # a recorder from outside keeps repeats, too
+                    continue
                 if 'stage' in values:  # and nothing else that has to be said each time
                     values.setdefault('no_progress', '0')
                 self._flags += [

@@ -256,7 +256,8 @@ class Check:
             ticks = Telling(block, int(stamps_ns[0])).among(flags, stamps_ns)
             said = ((int(stamps_ns[i]), block.say(*flags[i].tolist())) for i in ticks)
             arrays = [health.said_array(stamp_ns, node, one) for stamp_ns, one in said]
-            self.compare_events(arrays, lambda e: e.node == node and block.flags[0] in e.values)
+            keys = {block.flags[0], health.EVENT}
+            self.compare_events(arrays, lambda e: e.node == node and keys <= e.values.keys())
         elif block is PLANT:
             ends = map(int, stamps_ns[flags[:, 0] > 0])
             reports = (health.Report(node, health.FINISHED, health.COMPLETE, at) for at in ends)
