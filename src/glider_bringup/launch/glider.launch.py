@@ -57,9 +57,10 @@ def start(context: LaunchContext) -> list:
     said = f'{plan.scenario.name}: {plan.scenario.description} ({plan.parameters_file})'
     actions = [LogInfo(msg=said), *(node_action(node, plan) for node in plan.nodes)]
     if plan.managed:
-        names = [f'{plan.namespace}/{name}' for name in plan.managed]
         steps = [Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE]
-        actions.append(LifecycleTransition(lifecycle_node_names=names, transition_ids=steps))
+        actions.append(
+            LifecycleTransition(lifecycle_node_names=plan.managed_names, transition_ids=steps)
+        )
     return actions
 
 

@@ -197,9 +197,11 @@ def test_names_of_arguments_are_checked():
 
 @pytest.mark.parametrize('namespace', ['', '/'])
 def test_root_namespace(tmp_path, namespace):
-    plan = plan_launch({'namespace': namespace}, tmp_path)
+    plan = plan_launch({'namespace': namespace, 'lockstep': 'false'}, tmp_path)
     assert plan.namespace == '/'
     assert '/plant_node' in parameters(plan)
+    assert '/guard_node' in plan.managed_names
+    assert {*plan.managed_names} <= parameters(plan).keys()
 
 
 def test_clock_can_lie_in_the_namespace(tmp_path):

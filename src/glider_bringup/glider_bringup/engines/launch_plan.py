@@ -133,6 +133,11 @@ class LaunchPlan(NamedTuple):
     managed: tuple[str, ...]  #: nodes that wait to be configured and activated
 
     @property
+    def managed_names(self) -> list[str]:
+        """Full names of the managed nodes."""
+        return [f'{self.namespace.rstrip("/")}/{name}' for name in self.managed]
+
+    @property
     def environment(self) -> dict[str, str]:
         """What nodes are given beside the environment: on this machine if nobody says else."""
         return {RANGE: os.environ.get(RANGE, LOCAL)}
