@@ -54,8 +54,9 @@ _USUAL = {
 _SINCE_1970 = re.compile(
     r'seconds\s+since\s+1970-0?1-0?1([T ]0?0:0?0(:0?0(\.0*)?)?)?\s*(Z|UTC|\+00:?00)?'
 )
-#: Flags of quality, in a variable of the same name with this ending, of what is bad, or missing.
-_QUALITY, _BAD = '_QC', (4.0, 9.0)
+#: Flags of quality, in a variable of the same name with this ending, of what is bad, or missing;
+#: numbers or characters, which may be blank.
+_QUALITY, BAD = '_QC', ('4', '9', '4.0', '9.0')
 #: By our name, what each name in a file is multiplied by, best name first.
 Names = dict[str, dict[str, float]]
 
@@ -125,7 +126,7 @@ def read(path: Path, wanted: Names, spelt: Callable[[str], str] = str) -> dict[s
                 found[key] = values = _in_ours(f'{path}: {name}', key, variable, names[name])
                 flags = dataset.get(f'{by_name[name]}{_QUALITY}')
                 if flags is not None and flags.size == values.size:
-                    values[np.isin(flags.values.ravel().astype(float), _BAD)] = math.nan
+                    values[np.isin(flags.values.ravel().astype('U8'), BAD)] = math.nan
     return found
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from glider_base.errors import ConfigurationError
 from glider_flights.folders import Progress, files_in, of_one_flight, read_each
-from glider_flights.netcdf import SUFFIXES, fixes_of, names_of, read, refuse_missing
+from glider_flights.netcdf import BAD, SUFFIXES, fixes_of, names_of, read, refuse_missing
 from glider_flights.record import (
     Flight,
     Instruments,
@@ -40,8 +40,6 @@ ERIKSEN = {'a': 0.003836, 'b': 0.010078, 'c': 2.1e-6, 's': -0.25, 'length': 1.8}
 SHALLOWEST_RAD = math.radians(5.0)
 #: A dive with its fixes is not longer than this (s).
 LONGEST_DIVE_S = 2 * 86_400.0
-#: Marks of the base station for values that are bad, or missing.
-BAD = ('4', '9', '4.0', '9.0')
 
 
 def seaglider_files(place: Path) -> list[Path]:

@@ -633,6 +633,15 @@ def with_flags(data):
     return data.assign(flagged)
 
 
+def with_flags_of_characters(data):
+    """The same as characters, which are blank where nobody looked."""
+    data = with_flags(data)
+    names = ('DEPTH_QC', 'PITCH_QC')
+    return data.assign(
+        {name: (data[name].dims, np.where(data[name] == 4, b'4', b'')) for name in names}
+    )
+
+
 def with_fills(data):
     """Some have no number, and the file does not say which stands for none."""
     names, dived = ('DEPTH', 'PITCH', 'HEADING'), data.DEPTH > 50.0
@@ -646,6 +655,7 @@ def with_fills(data):
     [
         with_fills,
         with_flags,
+        with_flags_of_characters,
         with_what_is_not_valid,
         lambda data: data.assign(LONGITUDE_GPS=data.LONGITUDE_GPS % 360.0),
         across_the_date_line,
