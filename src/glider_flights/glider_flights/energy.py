@@ -65,21 +65,27 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
     if not recorded > 0.0:
         raise ConfigurationError(f'{place}: no energy is recorded in what is to be predicted')
     predicted_j = float((uses.doings[predicted] @ numbers).sum())
+    found = {
+        name: float(number)
+        for name, number, done in zip(uses.fields, numbers, source.doings.T, strict=True)
+        if done[source.first_half].any()
+    }
+    at_bound = [
+        f'{name} ran to its bound, 0 {UNITS[name]}: the flight does not tell it'
+        for name, number in found.items()
+        if number == 0.0
+    ]
     return {
         'vehicle': uses.kind,
         'files': uses.files,
-        'fitted': {
-            name: float(number)
-            for name, number, done in zip(uses.fields, numbers, source.doings.T, strict=True)
-            if done[source.first_half].any()
-        },
+        'fitted': found,
         'fitted_parts': int(source.first_half.sum()),
         'predicted_parts': int(predicted.sum()),
         'recorded_wh': recorded / 3600.0,
         'predicted_wh': predicted_j / 3600.0,
         'error_percent': 100.0 * (predicted_j / recorded - 1.0),
         'measured': uses.masses,
-        'notes': uses.notes,
+        'notes': [*uses.notes, *at_bound],
     }
 
 

@@ -92,6 +92,15 @@ def test_another_vehicle_is_predicted_as_far_off_as_it_is(tmp_path):
     assert told['error_percent'] == pytest.approx(-20.0, abs=1e-3)
 
 
+def test_a_number_that_the_fit_does_not_find_is_told(tmp_path):
+    shallow = np.array([0.0, 10.0, 10.0, 20.0, 400.0])  # as if it took less the deeper it is
+    told = energy(write_dives(tmp_path / 'a', 4, gc_depth=('gc', shallow)))
+    assert told['fitted']['pump_out_per_m'] == 0.0
+    assert told['notes'] == [
+        'pump_out_per_m ran to its bound, 0 J/cc/m: the flight does not tell it'
+    ]
+
+
 def test_dives_of_another_vehicle_and_copies_are_left_out(tmp_path):
     folder = write_dives(tmp_path / 'a', 4)
     alone = energy(folder)
