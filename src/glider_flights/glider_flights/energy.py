@@ -85,7 +85,7 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
         'predicted_wh': predicted_j / 3600.0,
         'error_percent': 100.0 * (predicted_j / recorded - 1.0),
         'measured': uses.masses,
-        'notes': [*uses.notes, *at_bound],
+        'notes': [*uses.notes, *(fitted.notes if fitted else ()), *at_bound],
     }
 
 

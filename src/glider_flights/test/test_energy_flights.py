@@ -101,6 +101,12 @@ def test_a_number_that_the_fit_does_not_find_is_told(tmp_path):
     ]
 
 
+def test_what_is_left_out_of_the_flight_that_is_fitted_on_is_told(tmp_path):
+    mine, other = write_dives(tmp_path / 'a', 4), write_dives(tmp_path / 'b', 3)
+    (mine / 'p1710005.nc').write_bytes(b'')
+    assert 'p1710005.nc' in ' '.join(energy(other, '--fit-on', mine)['notes'])
+
+
 def test_dives_of_another_vehicle_and_copies_are_left_out(tmp_path):
     folder = write_dives(tmp_path / 'a', 4)
     alone = energy(folder)
