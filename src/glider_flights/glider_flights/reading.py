@@ -19,6 +19,8 @@ from glider_flights.slocum import read_slocum, slocum_files
 #: Where a glider sinks or rises by more than this (m/s), its nose further down or up than that
 #: (rad), a pitch shows its sign; of more of such samples than this it has the other one.
 RATE_MPS, PITCH_RAD, MOST_AGAINST = 0.05, math.radians(5.0), 0.9
+#: Where the pitch tells no speed in more than this share of them, ways are said to be short.
+MOST_LEVEL = 0.2
 #: Radians that are said to be degrees are less than this (rad), however steep a glide is.
 LEVEL_RAD = math.radians(0.5 * math.pi)
 
@@ -73,6 +75,12 @@ def _nose_up(place: Path, flight: Flight) -> Flight:
         raise ConfigurationError(
             f'{place}: the pitch is nose up while it sinks, or down while it rises, in '
             f'{against / shown:.0%} of its samples (allowed: + nose up)'
+        )
+    level = moved - shown + against
+    if level > MOST_LEVEL * moved:
+        flight.notes.append(
+            f'the pitch is level, or of the other sign, in {level / moved:.0%} of the samples '
+            'that sink or rise, as where it is recorded too seldom: ways are too short'
         )
     if flight.kind == 'og1' and moved and steepest < LEVEL_RAD:
         raise ConfigurationError(

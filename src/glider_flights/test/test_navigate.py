@@ -242,6 +242,16 @@ def test_a_current_that_is_far_off_by_the_way_is_told_so(tmp_path, write_dbd):
     assert float(metres) == pytest.approx(0.06 * 2.0 * LEG_S, abs=30.0)
 
 
+def test_a_pitch_that_tells_no_speed_in_much_of_a_dive_is_told(tmp_path, write_dbd):
+    pytest.importorskip('dbdreader')
+    table = sensors(2)
+    time_s, pitch = table['m_pitch']
+    table['m_pitch'] = time_s, np.where(table['m_depth'][1] > 225.0, 0.0, pitch)
+    write_dbd(tmp_path / '00010000.dbd', table, True)
+    (note,) = read_flight(tmp_path, None, quiet).notes
+    assert 'in 50% of the samples' in note and 'ways are too short' in note
+
+
 def test_the_fullest_kind_of_file_is_read(tmp_path):
     for name in ('a.sbd', 'A.DCD', 'a.dbd', 'b.dcd', 'a.ebd', 'a.txt'):
         (tmp_path / name).touch()
