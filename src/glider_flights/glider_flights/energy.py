@@ -214,6 +214,11 @@ def slocum_uses(place: Path, cache: Path | None, progress: Progress) -> Uses:
     middle = 0.5 * (depth[1:] + depth[:-1])
     known = (steps_s > 0.0) & (steps_s <= GAP_S) & np.isfinite(middle)
     known &= (joules >= 0.0) & (joules <= MOST_W * steps_s)
+    if not known.any():
+        raise ConfigurationError(
+            f'{place}: its counter of charge is recorded every {np.median(steps_s):.0f} s, '
+            f'of which no step can be used (needed: every {GAP_S:.0f} s or less, with a depth)'
+        )
     is_up = middle < SURFACE_DEPTH_M
     calls = np.nan_to_num(at_times(time_s, *sensors[CALL]))[1:] > 0.5
     pumped = np.diff(np.interp(time_s, oil_s, median_filter(oil, 3, mode='nearest')))

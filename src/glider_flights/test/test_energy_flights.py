@@ -249,3 +249,11 @@ def test_a_slocum_without_a_counter_of_charge_is_told_so(tmp_path, write_dbd):
     del sensors['m_coulomb_amphr_total']
     write_dbd(tmp_path / '00010000.DBD', sensors, cached=False)
     assert 'm_coulomb_amphr_total or m_coulomb_amphr is not recorded' in refused(tmp_path)
+
+
+def test_a_slocum_whose_counter_is_recorded_too_seldom_is_told_so(tmp_path, write_dbd):
+    pytest.importorskip('dbdreader')
+    sensors = slocum(20)
+    sensors['m_coulomb_amphr_total'] = tuple(one[::61] for one in sensors['m_coulomb_amphr_total'])
+    write_dbd(tmp_path / '00010000.DBD', sensors, cached=False)
+    assert 'every 610 s, of which no step can be used (needed: every 600 s' in refused(tmp_path)
