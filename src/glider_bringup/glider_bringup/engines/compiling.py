@@ -39,7 +39,7 @@ def shown_once(combination: Combination, tell: Tell) -> Iterator[None]:
     except NOT_COMPILED as error:
         raise ConfigurationError(
             f'law {law} with method {method}: cannot be compiled: {reason(error)[:MAX_LINE]} '
-            '(allowed: numbers that keep their type, 0.0 for a float)'
+            '(allowed: numbers that keep their type, 0.0 for a float; none at random)'
         ) from None
 
 
