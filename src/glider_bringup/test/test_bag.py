@@ -19,6 +19,7 @@ from rclpy.parameter import Parameter
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from glider_base.block import Said
 from glider_base.ros.lockstep import health
 from glider_base.ros.lockstep.process import Stop
 from glider_base.ros.wire.codec import to_cdr
@@ -461,9 +462,8 @@ def test_rows_tell_nothing_of_another_glider(tmp_path):
             codec = TOPICS[name].codec
             bag.write(name, tick * TICK_NS, codec.encode(tick * TICK_NS, np.ones(codec.width)))
     for tick, place, mask in [(3, '/glider', 4), (5, '/other', 1)]:
-        said = {'saturation': mask}
-        node = f'{place}/control_node'
-        told = health.status_array(tick * TICK_NS, node, health.WARN, 'at its limit', said)
+        said = Said('warn', 'at its limit', {'saturation': mask})
+        told = health.said_array(tick * TICK_NS, f'{place}/control_node', said)
         bag.write('/diagnostics', tick * TICK_NS, to_cdr(told))
     bag.close()
     (rows,) = (block.copy() for block in RecordedLog(Bag(tmp_path)).blocks())
