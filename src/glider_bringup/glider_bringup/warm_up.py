@@ -34,20 +34,16 @@ from glider_mission.recording.ros.recorded_run import Recording
 from glider_mission.recording.ros.verify.every_block import verify
 from glider_mission.rules import Rules
 from glider_mission.run_folder import make_run_folder
-from glider_mission.scenario import DEFAULT_SCENARIO, load_scenario
+from glider_mission.scenario import load_scenario
 from glider_model.plant.block import PLANT, measure_held, move_held
 from glider_model.plant.trim import solve_trim
 
-#: What README has everybody fly first.
-FIRST = 'slocum_shelf'
-
 
 def main() -> None:
-    """Blocks first, which loops consist of; then loops and what is called alone; side by side."""
-    blocks = [partial(one_tick, number) for number in range(len(BLOCKS))]
-    loops = partial(fly_one_tick, FIRST), fly_one_tick, score_nothing
+    """Blocks first, which the loop consists of; then what is called on its own; side by side."""
     with ProcessPoolExecutor(mp_context=get_context('fork')) as pool:
-        for tasks in (blocks, loops, (verify_one_tick, fly_for_notebooks)):
+        blocks = [partial(one_tick, number) for number in range(len(BLOCKS))]
+        for tasks in (blocks, (fly_one_tick, score_nothing), (verify_one_tick, fly_for_notebooks)):
             for future in [pool.submit(task) for task in tasks]:
                 future.result()
     forget_old()
@@ -69,9 +65,9 @@ def one_tick(number: int) -> None:
         order(own)
 
 
-def fly_one_tick(name: str = DEFAULT_SCENARIO) -> None:
-    """One tick of a scenario by the direct engine."""
-    state, params = mission_of(load_scenario(name))
+def fly_one_tick() -> None:
+    """One tick by the direct engine."""
+    state, params = mission_of(load_scenario())
     fly(state, params, np.zeros((1, ROW)))
 
 
