@@ -18,7 +18,7 @@ from scipy.optimize import nnls
 from glider_base.errors import ConfigurationError
 from glider_flights.folders import Progress, read_each, said, usual_vehicle
 from glider_flights.netcdf import names_of, read, refuse_missing
-from glider_flights.record import SURFACE_DEPTH_M, at_times, vertical_rate
+from glider_flights.record import SURFACE_DEPTH_M, at_bound, at_times, vertical_rate
 from glider_flights.seaglider import DIVE_FILE, seaglider_files
 from glider_flights.slocum import Sensors, read_sensors, slocum_files
 
@@ -70,11 +70,7 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
         for name, number, done in zip(uses.fields, numbers, source.doings.T, strict=True)
         if done[source.first_half].any()
     }
-    at_bound = [
-        f'{name} ran to its bound, 0 {UNITS[name]}: the flight does not tell it'
-        for name, number in found.items()
-        if number == 0.0
-    ]
+    bound = [at_bound(name, 0.0, UNITS[name]) for name, one in found.items() if one == 0.0]
     return {
         'vehicle': uses.kind,
         'files': uses.files,
@@ -85,7 +81,7 @@ def predict(place: Path, uses: Uses, fitted: Uses | None) -> dict[str, Any]:
         'predicted_wh': predicted_j / 3600.0,
         'error_percent': 100.0 * (predicted_j / recorded - 1.0),
         'measured': uses.masses,
-        'notes': [*uses.notes, *(fitted.notes if fitted else ()), *at_bound],
+        'notes': [*uses.notes, *(fitted.notes if fitted else ()), *bound],
     }
 
 

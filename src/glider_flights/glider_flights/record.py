@@ -191,6 +191,11 @@ def local_metres(origin_deg: np.ndarray, latitude_deg, longitude_deg) -> np.ndar
     return np.stack([north, turned * scale * METRES_PER_DEGREE], axis=-1)
 
 
+def at_bound(name: str, value: float, unit: str) -> str:
+    """Say that a fitted number ran to its bound."""
+    return f'{name} ran to its bound, {value:g} {unit}: the flight does not tell it'
+
+
 def at_times(
     time_s: np.ndarray,
     own_s: np.ndarray,

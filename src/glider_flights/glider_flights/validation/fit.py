@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from glider_base.errors import ConfigurationError
+from glider_flights.record import at_bound
 from glider_flights.validation.flying import Imposed, Model, Track, fly
 from glider_flights.validation.score import Adcp, speed_off
 
@@ -155,9 +156,7 @@ def at_bounds(names: tuple[str, ...], start: Model, model: Model) -> list[str]:
         one = CONSTANTS[name]
         value, ends = one.read(model), one.bounds(one.read(start))
         if min(abs(value - end) for end in ends) < 1e-3 * one.step:
-            notes.append(
-                f'{name} ran to its bound, {value:g} {one.unit}: the flight does not tell it'
-            )
+            notes.append(at_bound(name, value, one.unit))
     return notes
 
 
