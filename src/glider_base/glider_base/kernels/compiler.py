@@ -4,7 +4,7 @@
 
 That is machine code of kernels that others inline, bitcode of those that nobody inlines, counts of
 references in tuples that have none, and passes over loops in what has been inlined. All of it
-stands on what is not public in numba.
+stands on what is not public in numba, as does the refusal of what draws random numbers.
 With any other numba than the one that it was written for, kernels are compiled as numba does it.
 With any of them, Python looks for no garbage while something is compiled.
 """
