@@ -76,32 +76,54 @@ def names_of(kind: str) -> Names:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[list]:
-    """The datasets of all groups of a file, of NetCDF 3 or 4.
+def opened(path: Path, is_wanted: Callable[[str], bool]) -> Iterator[list]:
+    """The datasets of all groups of a file, of NetCDF 3 or 4, with the variables that are wanted.
 
     Raises ConfigurationError, also if one turns out to be damaged while it is read.
     """
     try:
         with ExitStack() as stack:
-            yield [stack.enter_context(dataset) for dataset in _datasets(path)]
+            yield _datasets(path, is_wanted, stack)
     except ConfigurationError:
         raise
     except Exception as error:  # noqa: BLE001 - of a damaged file the libraries say anything
         raise ConfigurationError(f'{path}: cannot be read as NetCDF: {error}') from None
 
 
-def _datasets(path: Path) -> list:
+def _datasets(path: Path, is_wanted: Callable[[str], bool], stack: ExitStack) -> list:
     import xarray
 
     with path.open('rb') as file:
         start = file.read(4)
     if start[:3] == b'CDF':
-        return [xarray.open_dataset(path, engine='scipy', decode_times=False)]
+        dataset = xarray.open_dataset(path, engine='scipy', decode_times=False)
+        return [stack.enter_context(dataset)]
     if start != b'\x89HDF':
         raise ValueError('it is neither NetCDF 3 nor NetCDF 4')
     with installed(f'{path}: h5netcdf, which reads NetCDF 4'):
-        import h5netcdf  # noqa: F401 - xarray reads NetCDF 4 through it
-    return list(xarray.open_groups(path, engine='h5netcdf', decode_times=False).values())
+        import h5netcdf
+    file = stack.enter_context(h5netcdf.File(path, 'r', decode_vlen_strings=True))
+    return [_dataset(group, is_wanted) for group in _groups(file)]
+
+
+def _groups(group) -> Iterator:
+    """A group of NetCDF 4, and all within it."""
+    yield group
+    for inner in group.groups.values():
+        yield from _groups(inner)
+
+
+def _dataset(group, is_wanted: Callable[[str], bool]):
+    """What is wanted of a group; xarray itself first opens all, of a Seaglider hundreds."""
+    import xarray
+
+    store = xarray.backends.H5NetCDFStore(group)
+    variables = {
+        name: store.open_store_variable(name, group.variables[name])
+        for name in group.variables
+        if is_wanted(name)
+    }
+    return xarray.decode_cf(xarray.Dataset(variables, attrs=group.attrs), decode_times=False)
 
 
 def read(path: Path, wanted: Names, spelt: Callable[[str], str] = str) -> dict[str, np.ndarray]:
@@ -112,7 +134,8 @@ def read(path: Path, wanted: Names, spelt: Callable[[str], str] = str) -> dict[s
     depth, pressure or angle in a unit that is not known.
     """
     found: dict[str, np.ndarray] = {}
-    with opened(path) as groups:
+    every = {name + end for names in wanted.values() for name in names for end in ('', _QUALITY)}
+    with opened(path, lambda name: spelt(name) in every) as groups:
         for dataset in groups:
             by_name = {spelt(str(name)): name for name in dataset.variables}
             for key, names in wanted.items():

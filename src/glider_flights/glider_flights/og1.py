@@ -46,6 +46,9 @@ from glider_model.ocean.columns import is_height
 from glider_model.onboard.glide_polar import make_polar
 from glider_model.vehicle.file import Vehicle
 
+#: By which variables a file is one of such a flight, or one of a Seaglider's base station.
+_MARKS = ('TIME', 'PITCH', 'GLIDER_PITCH', 'LATITUDE_GPS', 'LOG_GPS_LAT')
+
 
 def og1_files(place: Path) -> list[Path]:
     """NetCDF files, if one of them has a single time for all and fixes or pitch, as OG1 has.
@@ -59,12 +62,11 @@ def og1_files(place: Path) -> list[Path]:
 
 def _is_one(path: Path) -> bool:
     try:
-        with opened(path) as groups:
+        with opened(path, lambda name: name.upper() in _MARKS) as groups:
             names = {str(name).upper() for part in groups for name in part.variables}
     except ConfigurationError:
         return False
-    marks = {'PITCH', 'GLIDER_PITCH', 'LATITUDE_GPS'} & names
-    return 'TIME' in names and bool(marks) and 'LOG_GPS_LAT' not in names
+    return 'TIME' in names and len(names) > 1 and 'LOG_GPS_LAT' not in names
 
 
 def read_og1(place: Path, progress: Progress) -> Flight:
@@ -147,7 +149,7 @@ def _read(path: Path) -> LogFile:
 
 def _own_polar(path: Path) -> Polar | None:
     """Lift and drag of the file of a vehicle, as `glider_flights.record.Polar` has them."""
-    with opened(path) as groups:
+    with opened(path, lambda _: False) as groups:
         text = groups[0].attrs.get('vehicle_yaml')
     if text is None:
         return None
