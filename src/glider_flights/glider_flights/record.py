@@ -27,9 +27,9 @@ LONGEST_STAY_S = 3600.0
 SHORTEST_SEGMENT_S = 300.0
 #: A fix has the depth of a sample that is no further from it than this (s).
 NEAR_S = 30.0
-#: Further than this from the others of its stay (m), and as far as it may have drifted at no more
-#: than this (m/s), a fix is wrong; a current and a glider together are no faster either.
-FAR_OFF_M, FASTEST_MPS = 1000.0, 4.0
+#: Of two fixes of a stay that are further apart than this (m), and as far as it may have drifted
+#: at no more than this (m/s), one is wrong; a current and a glider together are no faster either.
+FAR_OFF_M, FASTEST_MPS = 100.0, 4.0
 #: Longest time without a sample (s), and as a share of the segment; the larger of them counts.
 LONGEST_GAP_S, LONGEST_GAP = 900.0, 0.2
 
@@ -382,10 +382,23 @@ def stays(fixes: Fixes, samples: Samples) -> list[Fixes]:
 
 
 def _together(fixes: Fixes) -> Fixes:
-    """Fixes of a stay without those that a drifting vehicle cannot have had."""
-    off = np.hypot(*(fixes.place_m - np.median(fixes.place_m, axis=0)).T)
-    usable = off <= FAR_OFF_M + FASTEST_MPS * np.ptp(fixes.time_s)
-    return Fixes(fixes.time_s[usable], fixes.place_m[usable]) if usable.any() else fixes
+    """The most fixes of a stay that a drifting vehicle can have had one after the other.
+
+    Of as many the later ones: the first may be from where it dived.
+    """
+    count = len(fixes.time_s)
+    longest, previous = np.ones(count, int), np.arange(count)
+    for one in range(1, count):
+        apart_m = np.hypot(*(fixes.place_m[:one] - fixes.place_m[one]).T)
+        drifted_m = FASTEST_MPS * (fixes.time_s[one] - fixes.time_s[:one])
+        before = np.where(apart_m <= FAR_OFF_M + drifted_m, longest[:one], 0)
+        if before.any():
+            previous[one] = before.argmax()
+            longest[one] += before.max()
+    kept = [count - 1 - int(longest[::-1].argmax())]
+    while previous[kept[-1]] != kept[-1]:
+        kept.append(previous[kept[-1]])
+    return Fixes(fixes.time_s[kept[::-1]], fixes.place_m[kept[::-1]])
 
 
 def cut(fixes: Fixes, samples: Samples) -> tuple[list[Cut], list[str]]:

@@ -200,11 +200,14 @@ def test_attitude_that_is_not_recorded_at_the_surface_takes_no_depth_from_it(tmp
         assert row.seconds == pytest.approx(2.0 * LEG_S, abs=40.0)
 
 
-def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path, write_dbd):
+@pytest.mark.parametrize(('fix', 'off_min'), [(3, 30.0), (8, 0.5)])
+def test_a_fix_far_off_and_one_under_water_are_left_out(tmp_path, write_dbd, fix, off_min):
+    """The first of a stay may be 900 m off: that from which it dived, as a real Slocum sent it."""
     pytest.importorskip('dbdreader')
     table = sensors(2)
     time_s, latitude = table['m_gps_lat']
-    latitude[3] += 30.0
+    assert fix == 3 or time_s[fix] - time_s[fix - 1] > 2.0 * LEG_S
+    latitude[fix] += off_min
     deep_s = START_S + 1500.0
     for name, value in (('m_gps_lat', latitude[0]), ('m_gps_lon', table['m_gps_lon'][1][0])):
         table[name] = (np.append(time_s, deep_s), np.append(table[name][1], value))
