@@ -354,7 +354,7 @@ def test_who_comes_up_far_from_its_last_point_flies_on_to_it(tmp_path):
     data = whole.to_xarray()
     up = np.flatnonzero(np.diff((data.stage.values == AT_END_OF_PATH).astype(int)) == 1)
     assert len(up) > 1 and data.ground_truth_odom_east.values[up[0]] > 40.0
-    changes['duration_s'] = 0.1 * (up[0] + 1500)
+    changes['duration_s'] = 0.1 * (up[0] + 300)
     runs = [
         glider.fly('current_8deg', changes, engine=engine, bag=True, out=tmp_path / engine)
         for engine in ('direct', 'nodes')
@@ -396,7 +396,7 @@ def test_who_has_come_up_at_its_last_point_has_arrived_though_it_drifts_on(metho
     path = {'kind': 'waypoints', 'waypoints': [[0, 0], [150, 0]], 'arrival_radius_m': 40.0}
     changes = {'dives': 0, 'duration_s': 5000.0, 'path': path, 'profile.depth_m': 20.0}
     current = {'speed_mps': 0.4, 'direction_deg': 0.0}
-    changes |= {'current': current, 'profile.wait_s': 150.0, 'profile.surface_every_dives': 1}
+    changes |= {'current': current, 'profile.wait_s': 110.0, 'profile.surface_every_dives': 1}
     changes |= {'navigation': {'method': method, 'current': 'forecast', 'forecast': current}}
     changes |= {'sensors.gps_first_fix_s': 20.0, 'profile.prepare_s': 0.0}
     runs = [

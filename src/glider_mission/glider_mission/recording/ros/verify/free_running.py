@@ -184,8 +184,10 @@ def _consecutive(check: Check, start: int, end: int, begin: dict[str, int]):
     for name, place in begin.items():
         series = check.recording.series[name]
         rows[name] = place + np.arange(end - start)
-        inside = np.clip(rows[name], 0, len(series) - 1)
-        fits &= (rows[name] == inside) & ~np.isin(inside, list(series.unusable))
+        inside = np.maximum(np.minimum(rows[name], len(series) - 1), 0)
+        fits &= rows[name] == inside
+        if series.unusable:
+            fits &= ~np.isin(inside, list(series.unusable))
         newest_ns = np.maximum(newest_ns, series.stamps_ns[inside])
     misfits = np.flatnonzero(~fits | (newest_ns != wanted_ns))
     count = int(misfits[0]) if len(misfits) else end - start
