@@ -352,21 +352,21 @@ def test_overshoot_is_what_is_beyond_the_target():
     assert score(make_log(t, depth=depth), target_m=1200.0)['depth_m']['overshoot'] == 0.0
 
 
-@pytest.mark.parametrize('ahead_m', [0.0, -30.0])
-def test_distance_is_the_way_along_the_path(ahead_m):
+@pytest.mark.parametrize(('begin_m', 'end_m'), [(0.0, 0.0), (0.0, -30.0), (-20.0, 0.0)])
+def test_distance_is_the_way_along_the_path(begin_m, end_m):
     """Around a circle of 100 m: its circumference, not the distance from start to end.
 
-    A vehicle that falls behind its target by 30 m has gone 30 m less.
+    A vehicle that falls behind its target by 30 m has gone 30 m less; one that catches up, more.
     """
     t = ticks(1000.0)
     angle = 2.0 * math.pi * t / t[-1]
     north, east = 100.0 * np.cos(angle), 100.0 * np.sin(angle)
-    off = ahead_m * t / t[-1]
+    off = begin_m + (end_m - begin_m) * t / t[-1]
     place = {'north': north - np.sin(angle) * off, 'east': east + np.cos(angle) * off}
     log = make_log(t, target_n=north, target_e=east, **place)
     along = score(log)['distance_along_path_m']
     # the course is told by a metre of the path, over which it turns
-    assert along == pytest.approx(200.0 * math.pi + ahead_m, abs=0.01)
+    assert along == pytest.approx(200.0 * math.pi + end_m - begin_m, abs=0.01)
 
 
 def test_final_state_is_that_of_the_last_tick():
