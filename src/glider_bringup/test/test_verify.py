@@ -178,6 +178,14 @@ def test_bag_whose_writer_was_killed_is_compared_as_far_as_it_goes(short_run, tm
     assert 0 < report['blocks'][0]['ticks'] < 1200
 
 
+@pytest.mark.parametrize('said', [1, 2, 9])
+def test_a_run_that_was_broken_off_within_a_tick_is_identical(altered, recorded, tmp_path, said):
+    begins = next(i for i, m in enumerate(recorded) if m.log_ns == 300 * TICK_NS)
+    report = verified(altered(recorded[: begins + said]), tmp_path)
+    assert report['identical'], [one['first'] for one in report['blocks']]
+    assert report['blocks'][0]['ticks'] == 301
+
+
 # ---------------------------------------------------------------------- one bit
 
 
