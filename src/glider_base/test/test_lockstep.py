@@ -594,6 +594,15 @@ def test_one_that_publishes_alone_is_told_whose_the_topic_is(listening):
     assert said == f'/glider/reference is published by /glider/my_guidance and not by {GUIDANCE}'
 
 
+def test_one_that_was_started_again_in_a_run_is_told_what_to_do(listening):
+    add, is_believed, item = listening
+    again = add(GUIDANCE)
+    assert is_believed(again, 9.0)
+    said = peers.stranger(again.node, Input(TOPICS['reference'], True), item.owner.gid)
+    assert said.startswith('/glider/reference is published by /glider/guidance_node which was')
+    assert said.endswith('started when this run had begun: start all its nodes again')
+
+
 @pytest.mark.parametrize('is_first', [True, False])
 def test_silence_of_the_first_is_no_chance_for_a_stranger(listening, is_first):
     """Neither for one that came before it, nor for one that comes in its silence."""

@@ -62,6 +62,8 @@ def stranger(node: Node, item: Input, gid: bytes) -> str:
     how = 'too' if {*names} - {gid} else f'and not by {topic.publisher}'
     if how != 'too' and gid in item.owner.strangers:
         how = f'which spoke while {item.owner.name or _NOBODY} did: start it again'
+    elif how != 'too' and name == f'{node.get_namespace().rstrip("/")}/{topic.publisher}':
+        how = 'which was started when this run had begun: start all its nodes again'
     return published_by(node, topic, name, how)
 
 
