@@ -303,7 +303,7 @@ def test_attitude_that_is_none_is_refused_and_named(flight):
     flight.until(lambda: vehicle.said('missing or stale: imu'))
 
 
-def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(context):
+def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(context, capfd):
     flight = Flight(context, managed=True, input_max_age_s=DEADLINE_S)
     vehicle, services = flight.vehicle, '/glider/navigation_node'
     change = vehicle.node.create_client(ChangeState, f'{services}/change_state')
@@ -322,6 +322,7 @@ def test_managed_node_acts_while_it_is_active_and_forgets_when_it_is_configured(
 
     try:
         flight.until(change.service_is_ready)
+        assert 'silent until it is configured and activated' in capfd.readouterr().err
         for number in (Transition.TRANSITION_ACTIVATE, 99):  # by its number, as managers ask
             request = ChangeState.Request()
             request.transition.id = number

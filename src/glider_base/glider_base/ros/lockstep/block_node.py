@@ -88,6 +88,7 @@ class BlockNode(StepNode, LifecycleNodeMixin):
             LifecycleNodeMixin.__init__(self, enable_communication_interface=True)
             self._change_state = self._service_change_state.callback
             self._service_change_state.callback = self.on_change_state
+            self.get_logger().info('managed: silent until it is configured and activated')
         else:
             super().on_ready()
 
