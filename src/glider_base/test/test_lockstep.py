@@ -42,6 +42,7 @@ from glider_base.ros.wire.topics import (
     RECORDER,
     TOPICS,
 )
+from glider_base.settings import ConfigurationError
 from glider_base.signals import TICK_NS
 
 TIMEOUT_S = 30.0
@@ -699,6 +700,13 @@ def test_parameter_that_cannot_be_set_in_flight_is_refused_by_its_name(
     (result,) = future.result().results
     assert not result.successful
     assert result.reason.startswith(why)
+
+
+def test_a_node_of_another_name_is_refused(context):
+    """It flew by the defaults: a parameter file has its own name."""
+    words = ['--ros-args', '-r', '__node:=law']
+    with pytest.raises(ConfigurationError, match='__node:=law: not usable: the others know con'):
+        StepNode('control_node', context=context, cli_args=words)
 
 
 def test_parameter_of_a_type_that_there_is_not_ends_no_node(make_graph, context):

@@ -36,7 +36,7 @@ from glider_base.ros.parameters import declare_settings, unknown_parameters
 from glider_base.ros.wire import qos, topics
 from glider_base.ros.wire.codec import MessageError, NotFiniteFieldError, to_cdr
 from glider_base.ros.wire.topics import TOPICS, Topic, topic_of
-from glider_base.settings import Settings, number
+from glider_base.settings import ConfigurationError, Settings, number
 from glider_base.signals import TICK_NS, not_finite, raised
 from glider_base.wiring import CONDITION, WHEN_SILENT
 
@@ -85,6 +85,9 @@ class TickNode(Node):
 
     def __init__(self, name: str, **kwargs) -> None:
         super().__init__(name, **kwargs)
+        if self.get_name() != name:  # it would have no parameters, and be obeyed by nobody
+            said = f'__node:={self.get_name()}: not usable: the others know {name} by its name'
+            raise ConfigurationError(f'{said} (allowed: another namespace, -r __ns:=/NAME)')
         self.ticks = declare_settings(self, self.tick_settings)
         self.steady_clock = Clock(clock_type=ClockType.STEADY_TIME)
         is_simulated = self.get_parameter('use_sim_time').value
