@@ -593,6 +593,8 @@ def test_topics_that_were_remapped_are_named_where_nothing_is_compared(
     folder = altered(recorded, rename=lambda name: name.replace('/glider/odom', '/hw/odom'))
     notes = verified(folder, tmp_path, only=['guidance'])['notes']
     assert any('/hw/odom (nav_msgs/msg/Odometry)' in note for note in notes)
+    with pytest.raises(ConfigurationError, match='lacks odom: .* or where topics were remapped'):
+        score_again(folder)
 
 
 def test_half_a_topic_is_a_difference(altered, recorded, tmp_path):

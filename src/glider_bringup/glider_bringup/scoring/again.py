@@ -64,8 +64,8 @@ def score_bag(
     untold = not (old or log.end) and any(log.recorded().values())
     if not log.ticks and (lost or missing or untold):
         why = bag.cut or (
-            f'{log.lacks}, as in a free-running recording (allowed: runs in lockstep, with every '
-            'message of every tick)'
+            f'{log.lacks}, as in a free-running recording or where topics were remapped (allowed: '
+            'runs in lockstep, with every message of every tick)'
         )
         raise ConfigurationError(f'{run}: cannot be scored: {why}')
     if missing and (complete or not old or log.ticks < old['ticks']):
