@@ -439,6 +439,19 @@ def test_after_a_silence_a_step_is_as_long_as_its_own_node_takes_it(
     assert taken == {'navigation': 1.0, 'guidance': 1.0, 'control': 3.0}
 
 
+def test_a_free_running_block_that_had_acted_before_its_record_is_skipped(
+    altered, recorded, tmp_path
+):
+    """As by a recorder that was started again: what the block had told before is latched."""
+    later = [m for m in recorded if m.topic == '/diagnostics' or m.log_ns >= 300 * TICK_NS]
+    folder = altered(later)
+    write_parameters({'control_node': {'lockstep': False}}, folder / 'parameters.yaml')
+    for name in ('guidance', 'control'):
+        block = results(folder, tmp_path, only=[name])[name]
+        assert block['result'] == 'skipped', block['first']
+        assert 'is recorded from t = 30.0 s on, not from its first step' in block['reason']
+
+
 @pytest.mark.parametrize('keep', [False, True])
 def test_a_bag_without_events_of_its_nodes_does_not_say_how_it_ended(altered, recorded, keep):
     messages = [one for one in recorded if keep or one.topic != '/diagnostics']

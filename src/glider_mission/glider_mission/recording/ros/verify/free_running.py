@@ -74,6 +74,10 @@ def free_running(
     for name in block.inputs:
         if series[name].stamps_ns[0] > stamps_ns[0]:
             return begun_before(wired.name, name, series[name])
+    node, keys = recording.node(wired.node), {block.block.flags[0], health.EVENT}
+    told_ns = [e.stamp_ns for e in recording.events if e.node == node and keys <= e.values.keys()]
+    if told_ns and min(told_ns) < np.min(stamps_ns):  # latched: a later recorder hears it, too
+        return begun_before(wired.name, marker, series[marker])
     check = Check(block, recording, stamps_ns)
     passing = Passing(max_age_s)
     check.passed[:] = [passing.ticks(int(stamp_ns)) for stamp_ns in stamps_ns]
