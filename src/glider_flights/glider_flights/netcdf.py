@@ -123,7 +123,8 @@ def _dataset(group, is_wanted: Callable[[str], bool]):
         for name in group.variables
         if is_wanted(name)
     }
-    return xarray.decode_cf(xarray.Dataset(variables, attrs=group.attrs), decode_times=False)
+    dataset = xarray.Dataset(variables, attrs=store.get_attrs())
+    return xarray.decode_cf(dataset, decode_times=False)
 
 
 def read(path: Path, wanted: Names, spelt: Callable[[str], str] = str) -> dict[str, np.ndarray]:
