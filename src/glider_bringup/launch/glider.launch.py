@@ -89,8 +89,8 @@ def node_action(node: LaunchedNode, plan: LaunchPlan) -> Node:
 def on_exit(name: str, plan: LaunchPlan) -> Callable[[ProcessExited, LaunchContext], Any]:
     """What the end of a node means.
 
-    The last plant ends the launch. In lockstep nobody can go on without a peer that failed;
-    free-running nodes can, and nobody needs the node for transforms.
+    The last plant ends the launch, be it that somebody sent it away. In lockstep nobody can go on
+    without a peer that failed; free-running nodes can, and nobody needs the node for transforms.
     """
 
     def end(event: ProcessExited, context: LaunchContext) -> Shutdown | None:
@@ -102,6 +102,6 @@ def on_exit(name: str, plan: LaunchPlan) -> Callable[[ProcessExited, LaunchConte
         if name != PLANT:
             return None
         context.extend_globals({_FLYING: flying(context) - {plan.namespace}})
-        return None if flying(context) else Shutdown(reason='the run is complete')
+        return None if flying(context) else Shutdown(reason='the plant has ended')
 
     return end
