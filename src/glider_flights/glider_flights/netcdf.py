@@ -97,7 +97,8 @@ def _datasets(path: Path, is_wanted: Callable[[str], bool], stack: ExitStack) ->
         start = file.read(4)
     if start[:3] == b'CDF':
         dataset = xarray.open_dataset(path, engine='scipy', decode_times=False)
-        return [stack.enter_context(dataset)]
+        others = [name for name in dataset.variables if not is_wanted(name)]
+        return [stack.enter_context(dataset).drop_vars(others)]
     if start != b'\x89HDF':
         raise ValueError('it is neither NetCDF 3 nor NetCDF 4')
     with installed(f'{path}: h5netcdf, which reads NetCDF 4'):

@@ -887,6 +887,14 @@ def test_what_is_no_flight_is_refused(tmp_path):
     assert '2 folders below it' in told(str(tmp_path))
 
 
+@pytest.mark.parametrize('engine', ['scipy', 'h5netcdf'])
+def test_a_table_along_time_without_pitch_is_no_flight(tmp_path, engine):
+    pytest.importorskip('h5netcdf')
+    table = og1(1)[['TIME', 'DEPTH']]
+    table.to_netcdf(tmp_path / 'mooring.nc', engine=engine)
+    assert 'a flight in OG1 has TIME, and PITCH or LATITUDE_GPS' in told(str(tmp_path))
+
+
 @pytest.mark.parametrize(
     ('module', 'name'), [('dbdreader', '00010000.dbd'), ('h5netcdf', 'p1230001.nc')]
 )
