@@ -66,7 +66,7 @@ def _is_one(path: Path) -> bool:
             names = {str(name).upper() for part in groups for name in part.variables}
     except ConfigurationError:
         return False
-    return 'TIME' in names and len(names) > 1 and 'LOG_GPS_LAT' not in names
+    return names > {'TIME'} and 'LOG_GPS_LAT' not in names
 
 
 def read_og1(place: Path, progress: Progress) -> Flight:
